@@ -367,7 +367,7 @@ int main(void) {
     const size_t set_count = make_sets(sets);
     for (int k = 0; k < 4; ++k) {
         vshi_ao_cones cones;
-        vshi_ao_cones_place(&cones, counts[k]);
+        vshi_ao_cones_place(&cones, counts[k], false);
         for (size_t i = 0; i < set_count; ++i) {
             u[k][i] = uses_of(sets[i], &cones);
             if (counts[k] >= 8 && counts[k] <= 16) {

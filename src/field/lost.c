@@ -66,30 +66,13 @@ static bool holds(const vsh_field *field, vshi_vec place, vshi_vec normal) {
 static double thickness_at(const vsh_field *field, const vsh_triangles *triangles, vshi_vec place,
                            vshi_vec normal) {
     const double thin = DEPTH * field->voxel_size;
-    double found = INFINITY;
+    double nearest = INFINITY;
     for (int side = -1; side <= 1; side += 2) {
         const vshi_vec d = vshi_scale(normal, side), from = vshi_add(place, vshi_scale(d, NEAR * thin));
-        vshi_segment_ray ray = {{from.x, from.y, from.z}, {d.x, d.y, d.z}, INFINITY};
-        bool blocked = false;
-        vshi_triangles_blocked(triangles, &ray, 1, &blocked);
-        if (!blocked) {
-            continue;
-        }
-        found = isfinite(found) && found >= 0.0 ? found : -1.0;
-        double low = 0.0, high = thin;
-        ray.far = high;
-        vshi_triangles_blocked(triangles, &ray, 1, &blocked);
-        if (!blocked) {
-            continue;
-        }
-        for (int i = 0; i < 10; ++i) {
-            ray.far = 0.5 * (low + high);
-            vshi_triangles_blocked(triangles, &ray, 1, &blocked);
-            *(blocked ? &high : &low) = ray.far;
-        }
-        found = found >= 0.0 && isfinite(found) && found < high ? found : high;
+        const vshi_segment_ray ray = {{from.x, from.y, from.z}, {d.x, d.y, d.z}, INFINITY};
+        nearest = fmin(nearest, vshi_triangles_distance(triangles, &ray));
     }
-    return found;
+    return nearest <= thin || isinf(nearest) ? nearest : -1.0;
 }
 
 static int by_value(const void *a, const void *b) {

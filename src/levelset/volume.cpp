@@ -93,24 +93,16 @@ void grow_index_box(vsh_voxels_info &info, const vshi_block &block) {
 
 // The box of the centres: a frustum's map takes planes to planes, so that its corners are the box's too.
 bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
-    Vec3d low(std::numeric_limits<double>::infinity()), high = -low, middle;
-    for (int corner = 0; corner < 8; ++corner) {
-        int32_t index[3];
-        for (int axis = 0; axis < 3; ++axis) {
-            index[axis] = (corner >> axis & 1) != 0 ? info.index_max[axis] : info.index_min[axis];
-            middle[axis] = 0.5 * (double(info.index_min[axis]) + double(info.index_max[axis]));
-        }
-        const Vec3d at = centre_of(set, index);
-        low = openvdb::math::minComponent(low, at);
-        high = openvdb::math::maxComponent(high, at);
-    }
-    const Vec3d axes = axes_at(set, middle);
+    const openvdb::CoordBBox indices{Coord(info.index_min), Coord(info.index_max)};
+    const openvdb::BBoxd box = set.transform->indexToWorld(indices);
+    const Vec3d axes = axes_at(set, indices.getCenter());
     bool finite = true;
     for (int axis = 0; axis < 3; ++axis) {
-        info.bounds_min[axis] = low[axis];
-        info.bounds_max[axis] = high[axis];
+        info.bounds_min[axis] = box.min()[axis];
+        info.bounds_max[axis] = box.max()[axis];
         info.voxel_size[axis] = axes[axis];
-        finite = finite && std::isfinite(low[axis]) && std::isfinite(high[axis]) && axes[axis] > 0.0;
+        finite =
+            finite && std::isfinite(box.min()[axis]) && std::isfinite(box.max()[axis]) && axes[axis] > 0.0;
     }
     return finite;
 }

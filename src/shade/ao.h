@@ -127,13 +127,10 @@ static inline void vshi_ao_set_bent(const vshi_ao_task *task, size_t i, vshi_vec
 }
 
 /* Checks options (resolved ones); fills *task but for sampler, kernel and arrays, and *cones where the method
- * takes them. Errors: VSH_ERROR_ARGUMENT. */
-vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
+ * takes them. `sphere`: AO is the free share of all directions around a point, each counting alike. Errors:
+ * VSH_ERROR_ARGUMENT. */
+vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options, bool sphere,
                            vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error);
-
-/* Makes a prepared task one of free space: the free share of all directions around a point, each counting
- * alike. Errors: VSH_ERROR_ARGUMENT (taps, which go along a normal). */
-vsh_result vshi_ao_prepare_sphere(vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error);
 
 /* Points without normals have no AO. Errors: VSH_ERROR_ARGUMENT. */
 vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error);
@@ -191,7 +188,6 @@ static inline vshi_vec vshi_ao_direction(const vshi_vec axes[3], vshi_vec d) {
 }
 
 /* The methods: each shades points begin … end - 1, cones and rays VSHI_AO_GRAIN at most. */
-vshi_shade_fn vshi_ao_taps;
 vshi_shade_fn vshi_ao_by_cones;
 vshi_shade_fn vshi_ao_by_rays;
 vshi_shade_fn vshi_ao_by_squares; /* squares of a share, row by row */
@@ -207,10 +203,8 @@ static inline int32_t vshi_ao_tile_sampler(int32_t sampler) {
  * are, but at the edges of charts. */
 #define VSHI_AO_TILE_ENOUGH 0.55
 
-void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count);
-
-/* The same over the whole sphere, each an equal share of its solid angle. */
-void vshi_ao_cones_place_sphere(vshi_ao_cones *cones, int32_t count);
+/* Over the hemisphere, or over the whole sphere, each an equal share of its solid angle. */
+void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count, bool sphere);
 
 /* What is known of cone c of a point whose cones have the closenesses `close`: its own over its sine, and the
  * mean of its neighbours' where they are free, both clamped, in [-1, 1] and [0, 1]. */

@@ -43,31 +43,19 @@ static void find_neighbours(vshi_ao_cones *cones) {
 static const double GOLDEN_ANGLE = 2.39996322972865332, WIDEST = 0.95;
 
 /* Directions of equal weight: a golden-angle spiral over the disc, lifted to the hemisphere (Malley's
- * method). No cone dips below the receiver's plane, which is the receiver's own and hides nothing of what is
- * counted. */
-void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count) {
+ * method), or over the sphere. No cone over the hemisphere dips below the receiver's plane, which is the
+ * receiver's own and hides nothing of what is counted. */
+void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count, bool sphere) {
     cones->count = count;
-    const double cosine = 1.0 - 1.0 / count;
+    const double cosine = sphere ? fmax(0.0, 1.0 - 2.0 / count) : 1.0 - 1.0 / count;
     const double share = fmin(WIDTH * sqrt(1.0 - cosine * cosine), WIDEST);
     for (int32_t i = 0; i < count; ++i) {
         const double square = (i + 0.5) / count; /* of the disc's radius there */
-        const double radius = sqrt(square), height = sqrt(1.0 - square);
+        const double height = sphere ? 1.0 - (2.0 * i + 1.0) / count : sqrt(1.0 - square);
+        const double radius = sqrt(sphere ? 1.0 - height * height : square);
         cones->directions[i] =
             (vshi_vec){radius * vshi_cos(i * GOLDEN_ANGLE), radius * vshi_sin(i * GOLDEN_ANGLE), height};
-        cones->sines[i] = share < height ? share : height;
-    }
-    find_neighbours(cones);
-}
-
-void vshi_ao_cones_place_sphere(vshi_ao_cones *cones, int32_t count) {
-    cones->count = count;
-    const double cosine = fmax(0.0, 1.0 - 2.0 / count);
-    const double share = fmin(WIDTH * sqrt(1.0 - cosine * cosine), WIDEST);
-    for (int32_t i = 0; i < count; ++i) {
-        const double height = 1.0 - (2.0 * i + 1.0) / count, radius = sqrt(1.0 - height * height);
-        cones->directions[i] =
-            (vshi_vec){radius * vshi_cos(i * GOLDEN_ANGLE), radius * vshi_sin(i * GOLDEN_ANGLE), height};
-        cones->sines[i] = share;
+        cones->sines[i] = sphere || share < height ? share : height;
     }
     find_neighbours(cones);
 }
@@ -133,10 +121,7 @@ static double open_share(const vshi_ao_cones *cones, const float *close, vshi_ve
 }
 
 static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh_shade_stats *stats) {
-    vshi_march_stats work = {0, 0};
-    task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_GROWN, task->options->max_steps, &work);
-    stats->samples += work.samples;
-    stats->unfinished += work.unfinished;
+    vshi_chunk_march(chunk, task->kernel, task->field, VSHI_MARCH_GROWN, task->options->max_steps, stats);
     for (size_t r = 0; r < chunk->rays.count; ++r) {
         const float closeness = chunk->rays.close[r], sine = chunk->rays.sine[r];
         close[chunk->owner[r]] = closeness;

@@ -77,10 +77,7 @@ static void flush(vshi_ao_piece *b, vsh_shade_stats *stats) {
     if (b->chunk.rays.count == 0) {
         return;
     }
-    vshi_march_stats work = {0, 0};
-    task->kernel->march(task->field, &b->chunk.rays, VSHI_MARCH_GROWN, task->options->max_steps, &work);
-    stats->samples += work.samples;
-    stats->unfinished += work.unfinished;
+    vshi_chunk_march(&b->chunk, task->kernel, task->field, VSHI_MARCH_GROWN, task->options->max_steps, stats);
     stats->rays += b->chunk.rays.count;
     for (size_t r = 0; r < b->chunk.rays.count; ++r) {
         if (b->chunk.rays.close[r] > 0.0f) {

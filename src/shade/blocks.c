@@ -23,12 +23,6 @@ static const double SHORT = 48.0;
  * height of its centre, so that its rays enter it by then. */
 static const double NEAR_HEIGHT = 1.95, NEAR_LACK = 0.05;
 
-static void march_beams(const vshi_shadow_task *task, vshi_chunk *chunk, vsh_shade_stats *stats) {
-    vshi_march_stats work = {0, 0};
-    task->kernel->march(task->field, &chunk->rays, VSHI_MARCH_BEAM, task->options->max_steps, &work);
-    stats->samples += work.samples;
-}
-
 /* Whether it pays to look at less than the largest blocks where those leave cones open up to `end`: always
  * where a point's cone takes more than one march. */
 static bool worthwhile(const vshi_shadow_task *task, double end) {
@@ -276,7 +270,7 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
             shorten(task, facing, b, b->beam.begin);
         }
     }
-    march_beams(task, chunk, stats);
+    vshi_chunk_march(chunk, task->kernel, task->field, VSHI_MARCH_BEAM, task->options->max_steps, stats);
     for (size_t r = 0; r < chunk->rays.count; ++r) {
         block *b = &blocks[chunk->owner[r]];
         const double clear = (double)chunk->rays.clear[r];
@@ -360,7 +354,7 @@ void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const v
             proof[i] = VSHI_PROVED_FREE;
         }
     }
-    march_beams(task, &chunk, stats);
+    vshi_chunk_march(&chunk, task->kernel, task->field, VSHI_MARCH_BEAM, task->options->max_steps, stats);
     for (size_t r = 0; r < chunk.rays.count; ++r) {
         if (chunk.rays.proof[r] == VSHI_PROVED_FULL) {
             /* what hides a lamp may stand behind it, as seen from some of the points */

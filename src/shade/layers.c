@@ -105,7 +105,7 @@ static bool casts_ao(const vsh_layer *layer) {
     return layer->ao != 0 && layer->field != NULL;
 }
 
-static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh_light *light,
+static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh_light *light, bool sphere,
                           vshi_ao_cones *cones, vsh_error *error) {
     const vsh_layer *layer = &item->layer;
     vsh_shade_options *options = &item->options;
@@ -129,7 +129,7 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
         VSHI_TRY(vshi_shadow_prepare(&own, &item->light, options, &item->shadow, error));
         item->shadow.purpose = 31u * item->shadow.purpose + (uint32_t)index + 1u;
     } else {
-        VSHI_TRY(vshi_ao_prepare(&own, options, cones, &item->ao, error));
+        VSHI_TRY(vshi_ao_prepare(&own, options, sphere, cones, &item->ao, error));
     }
     if (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options)) {
         const int32_t rays = light != NULL ? vshi_shadow_most_rays(options) : vshi_ao_most_rays(options);
@@ -140,7 +140,7 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
 }
 
 vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
-                               const vsh_light *light, vshi_layers **layers, vsh_error *error) {
+                               const vsh_light *light, bool sphere, vshi_layers **layers, vsh_error *error) {
     *layers = NULL;
     if (occluders->layer_count == 0) {
         return VSH_OK;
@@ -156,8 +156,8 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
             item->options = *options;
             ++made->count;
             vsh_error why;
-            VSHI_TRY_DONE(
-                name_layer(prepare(item, i, occluders->lifted, light, &made->cones, &why), i, &why, error));
+            VSHI_TRY_DONE(name_layer(prepare(item, i, occluders->lifted, light, sphere, &made->cones, &why),
+                                     i, &why, error));
         }
     }
     if (made->count > 0) {
@@ -167,13 +167,6 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
 done:
     vshi_layers_free(made);
     return result;
-}
-
-vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error) {
-    for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
-        VSHI_TRY(vshi_ao_prepare_sphere(&layers->cones, &layers->items[i].ao, error));
-    }
-    return VSH_OK;
 }
 
 void vshi_layers_free(vshi_layers *layers) {

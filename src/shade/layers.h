@@ -20,16 +20,12 @@ static inline bool vshi_layer_is_closed(const vsh_layer *layer) {
 /* Bytes of what a resolved layer refers to, triangles aside. */
 double vshi_layer_bytes(const vsh_layer *layer);
 
-/* Prepares the layers, by resolved options, those that cast for `light`, or NULL for AO.
- * *layers is NULL where there are none. Free with vshi_layers_free(). Errors: VSH_ERROR_ARGUMENT,
- * VSH_ERROR_MEMORY. */
+/* Prepares the layers, by resolved options, those that cast for `light`, or NULL for AO; `sphere` is
+ * vshi_ao_prepare()'s. *layers is NULL where there are none. Free with vshi_layers_free(). Errors:
+ * VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
-                               const vsh_light *light, vshi_layers **layers, vsh_error *error);
+                               const vsh_light *light, bool sphere, vshi_layers **layers, vsh_error *error);
 void vshi_layers_free(vshi_layers *layers); /* NULL does nothing */
-
-/* Makes layers that are prepared for AO those of free space, see vshi_ao_prepare_sphere(). NULL does nothing.
- * Errors: VSH_ERROR_ARGUMENT. */
-vsh_result vshi_layers_prepare_sphere(vshi_layers *layers, vsh_error *error);
 
 /* Combines the layers with the values that the task's arrays hold of points begin … end - 1: at most
  * VSHI_PIECE, of AO VSHI_AO_GRAIN. */

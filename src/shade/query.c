@@ -2,7 +2,9 @@
 #include <vdbshade/query.h>
 
 #include "base/floats.h"
+#include "base/job.h"
 #include "base/memory.h"
+#include "base/parallel.h"
 #include "field/level.h"
 #include "shade/layers.h"
 #include "shade/query.h"
@@ -10,17 +12,174 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* --- points of a caller's arrays, packed or strided, of doubles or floats, as one thing to read */
+
+typedef struct point_view {
+    size_t count;
+    const char *positions, *normals, *texels; /* the last two may be NULL */
+    size_t position_stride, normal_stride, texel_stride;
+    bool floats; /* positions are floats */
+} point_view;
+
+static void view_position(const point_view *view, size_t i, double position[3]) {
+    const char *at = view->positions + i * view->position_stride;
+    if (view->floats) {
+        float p[3];
+        memcpy(p, at, sizeof p);
+        for (int axis = 0; axis < 3; ++axis) {
+            position[axis] = (double)p[axis];
+        }
+    } else {
+        memcpy(position, at, 3 * sizeof *position);
+    }
+}
+
+/* --- points sorted along Morton's curve. Hilbert's, which never jumps, saves a hundredth of the samples of a
+ * million random points and takes 30 ns more a point to compute. */
+
+enum {
+    ORDER_POINT = VSH_QUERY_BATCH - 1,
+    BITS = 14, /* of the curve, along each edge */
+    LAST = (1 << BITS) - 1,
+    SHIFT = 20, /* VSH_QUERY_BATCH is 1 << SHIFT */
+    DIGIT = 11,
+    PASSES = 4,
+    PIECE = 4096
+};
+
+_Static_assert(VSH_QUERY_BATCH == 1 << SHIFT, "points are numbered by the lowest bits");
+
+/* The curve fills the casters' box, grown by so many of its diagonals; points outside are put on its sides.
+ */
+static const double FAR = 4.0;
+
+typedef struct ordering {
+    const point_view *view;
+    size_t first; /* of the points */
+    double low[3];
+    double scale; /* cells are cubes */
+    uint64_t *order;
+} ordering;
+
+/* Bits with two zeros between each. */
+static inline uint64_t spread(uint64_t x) {
+    x = (x | x << 16) & 0x0000ff0000ffu;
+    x = (x | x << 8) & 0x00f00f00f00fu;
+    x = (x | x << 4) & 0x0c30c30c30c3u;
+    return (x | x << 2) & 0x249249249249u;
+}
+
+static uint64_t place_of(const ordering *o, const double p[3]) {
+    uint64_t place = 0;
+    bool finite = true;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double cell = (p[axis] - o->low[axis]) * o->scale;
+        finite = finite && isfinite(p[axis]);
+        place = place << 1 | spread((uint64_t)(cell > 0.0 ? cell < LAST ? cell : LAST : 0.0));
+    }
+    return finite ? place : UINT64_MAX >> SHIFT;
+}
+
+static void make_keys(void *user, size_t begin, size_t end) {
+    const ordering *o = user;
+    for (size_t i = begin; i < end; ++i) {
+        double p[3];
+        view_position(o->view, o->first + i, p);
+        o->order[i] = place_of(o, p) << SHIFT | i;
+    }
+}
+
+/* Sorts by the places, which are above the points' numbers. The sorted numbers come to lie in `order` after
+ * an even number of passes. */
+static void sort(uint64_t *order, uint64_t *spare, size_t count) {
+    for (int shift = SHIFT; shift < SHIFT + PASSES * DIGIT; shift += DIGIT) {
+        uint32_t at[1 << DIGIT] = {0}, sum = 0;
+        for (size_t i = 0; i < count; ++i) {
+            ++at[order[i] >> shift & ((1 << DIGIT) - 1)];
+        }
+        for (int value = 0; value < 1 << DIGIT; ++value) {
+            const uint32_t own = at[value];
+            at[value] = sum;
+            sum += own;
+        }
+        for (size_t i = 0; i < count; ++i) {
+            spare[at[order[i] >> shift & ((1 << DIGIT) - 1)]++] = order[i];
+        }
+        uint64_t *const sorted = spare;
+        spare = order;
+        order = sorted;
+    }
+}
+
+/* Orders points first … first + count - 1, at most VSH_QUERY_BATCH of them, on the job's threads: the lowest
+ * bits of order[i], ORDER_POINT, are a point's number from `first`. Points in one place keep their order;
+ * points that are not finite come last. `order` has room for twice as many. Errors: VSH_ERROR_CANCELLED,
+ * VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */
+static vsh_result order_points(vshi_job *job, const vsh_field *field, const point_view *view, size_t first,
+                               size_t count, uint64_t *order, vsh_error *error) {
+    ordering o = {.view = view, .first = first, .order = order};
+    double diagonal = 0.0, longest = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = field->world_max[axis] - field->world_min[axis];
+        diagonal += side * side;
+        longest = fmax(longest, side);
+    }
+    diagonal = sqrt(diagonal);
+    for (int axis = 0; axis < 3; ++axis) {
+        o.low[axis] = field->world_min[axis] - FAR * diagonal;
+    }
+    o.scale = (1 << BITS) / (longest + 2.0 * FAR * diagonal);
+    VSHI_TRY(vshi_parallel_for(job, count, PIECE, 0, make_keys, &o, error));
+    sort(order, order + count, count);
+    return VSH_OK;
+}
+
+/* --- whether it pays: a million random points on the sample asset take 0.59 µs each by cone as they come and
+ * 0.38 in order, a hundred thousand 0.59 and 0.49, ten thousand 0.63 and 0.67 */
+
+/* Whether shading points first … first + count - 1 in the curve's order pays: whether those that follow each
+ * other are mostly too far apart to share proofs. Looks at a few of them. */
+static bool order_pays(const vsh_field *field, const point_view *view, size_t first, size_t count) {
+    enum { LEAST = 32768, TOGETHER = 16, LOOKS = 256 };
+    static const double SPREAD = 8.0; /* voxels: side of the box of so many points that share little */
+    if (count < LEAST) {
+        return false;
+    }
+    size_t apart = 0;
+    for (size_t look = 0; look < LOOKS; ++look) {
+        const size_t begin = first + (count - TOGETHER) / (LOOKS - 1) * look;
+        double low[3], high[3], side = 0.0;
+        view_position(view, begin, low);
+        memcpy(high, low, sizeof high);
+        for (size_t i = 1; i < TOGETHER; ++i) {
+            double p[3];
+            view_position(view, begin + i, p);
+            for (int axis = 0; axis < 3; ++axis) {
+                low[axis] = fmin(low[axis], p[axis]);
+                high[axis] = fmax(high[axis], p[axis]);
+            }
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+            side = fmax(side, high[axis] - low[axis]);
+        }
+        apart += side > SPREAD * field->voxel_size;
+    }
+    return apart > LOOKS / 4;
+}
+
+/* --- shading */
+
 /* Points that are shaded on the calling thread: starting others costs as much as some dozens of marches. */
 enum { FEW = 64 };
 
 typedef struct query_call {
     const vsh_query *query;
-    vshi_view view;
+    point_view view;
     const float *faces; /* [points][3] or NULL, as of vshi_ao_task */
     const vsh_query_output *output;
     const vshi_kernel *kernel;
     size_t first;          /* of the points that are under way */
-    const uint64_t *order; /* vshi_order_points(), or NULL: as they come */
+    const uint64_t *order; /* order_points(), or NULL: as they come */
 } query_call;
 
 static inline float *array_of(float *const *arrays, size_t light) {
@@ -68,7 +227,7 @@ typedef struct piece {
 
 static inline size_t number_of(const piece *p, size_t i) {
     const query_call *call = p->call;
-    return call->first + (call->order != NULL ? call->order[p->begin + i] & VSHI_ORDER_POINT : p->begin + i);
+    return call->first + (call->order != NULL ? call->order[p->begin + i] & ORDER_POINT : p->begin + i);
 }
 
 static void scatter(const piece *p, size_t width, const float *values, float *to) {
@@ -80,12 +239,12 @@ static void scatter(const piece *p, size_t width, const float *values, float *to
 
 static void gather(const piece *p, gathered *g) {
     enum { AHEAD = 16 }; /* what comes next, from anywhere in memory, is asked for so early */
-    const vshi_view *all = &p->call->view;
+    const point_view *all = &p->call->view;
     for (size_t i = 0; i < p->count; ++i) {
         const size_t next = number_of(p, i + AHEAD < p->count ? i + AHEAD : i);
         const size_t point = number_of(p, i);
         __builtin_prefetch(all->positions + next * all->position_stride);
-        vshi_view_position(all, point, g->positions[i]);
+        view_position(all, point, g->positions[i]);
         if (all->normals != NULL) {
             __builtin_prefetch(all->normals + next * all->normal_stride);
             memcpy(g->normals[i], all->normals + point * all->normal_stride, sizeof g->normals[i]);
@@ -153,7 +312,7 @@ static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job
     for (; call->first < count; call->first += most) {
         const size_t left = count - call->first;
         const size_t now = left < most ? left : most;
-        const bool ordered = vshi_order_pays(field, &call->view, call->first, now);
+        const bool ordered = order_pays(field, &call->view, call->first, now);
         call->order = NULL;
         if (ordered && order == NULL) {
             VSHI_TRY_DONE(vshi_check_limit(run, vshi_field_bytes(field) + (double)most * 2.0 * sizeof *order,
@@ -161,7 +320,7 @@ static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job
             VSHI_TRY_DONE(vshi_allocate((void **)&order, most, 2 * sizeof *order, "order of points", error));
         }
         if (ordered) {
-            VSHI_TRY_DONE(vshi_order_points(job, field, &call->view, call->first, now, order, error));
+            VSHI_TRY_DONE(order_points(job, field, &call->view, call->first, now, order, error));
             call->order = order;
         }
         VSHI_TRY_DONE(vshi_shade_pieces(job, now, VSHI_PIECE, shade_piece, call, stats, error));
@@ -172,7 +331,7 @@ done:
 }
 
 /* Whether anything is asked for. Errors: VSH_ERROR_ARGUMENT. */
-static vsh_result check_output(const vsh_query *query, const vshi_view *view, const vsh_query_output *output,
+static vsh_result check_output(const vsh_query *query, const point_view *view, const vsh_query_output *output,
                                bool *any, vsh_error *error) {
     *any = output->ao != NULL || output->distance != NULL || output->gradient != NULL;
     for (size_t l = 0; l < query->light_count; ++l) {
@@ -212,7 +371,7 @@ static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, s
 }
 
 /* Points as they stand in memory. Errors: VSH_ERROR_ARGUMENT. */
-static vsh_result view_points(const vsh_points *points, const vsh_point_layout *layout, vshi_view *view,
+static vsh_result view_points(const vsh_points *points, const vsh_point_layout *layout, point_view *view,
                               const float **faces, vsh_error *error) {
     vsh_point_layout l = vsh_point_layout_default();
     VSHI_TRY(vshi_options_resolve(layout, &l, sizeof l, "vsh_point_layout", error));
@@ -224,14 +383,14 @@ static vsh_result view_points(const vsh_points *points, const vsh_point_layout *
     VSHI_TRY(resolve_stride("position_stride", unit, 3 * unit, &l.position_stride, error));
     VSHI_TRY(resolve_stride("normal_stride", sizeof(float), 3 * sizeof(float), &l.normal_stride, error));
     VSHI_TRY(resolve_stride("texel_stride", sizeof(uint32_t), sizeof(uint32_t), &l.texel_stride, error));
-    *view = (vshi_view){points->count,
-                        floats ? (const char *)l.float_positions : (const char *)points->positions,
-                        (const char *)points->normals,
-                        (const char *)points->texels,
-                        l.position_stride,
-                        l.normal_stride,
-                        l.texel_stride,
-                        floats};
+    *view = (point_view){points->count,
+                         floats ? (const char *)l.float_positions : (const char *)points->positions,
+                         (const char *)points->normals,
+                         (const char *)points->texels,
+                         l.position_stride,
+                         l.normal_stride,
+                         l.texel_stride,
+                         floats};
     *faces = l.face_normals;
     return VSH_OK;
 }
@@ -245,7 +404,7 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
     VSHI_NEEDS(output);
     vsh_run full_run;
     vsh_query_output full = vsh_query_output_default();
-    vshi_view view;
+    point_view view;
     const float *faces = NULL;
     bool any = false;
     VSHI_TRY(view_points(points, layout, &view, &faces, error));

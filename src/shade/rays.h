@@ -46,6 +46,11 @@ void vshi_chunk_push(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner);
 bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
                     vsh_shade_stats *stats);
 
+/* Marches a chunk's rays, VSHI_MARCH_…, and counts the work. Proofs that are not finished prove nothing, so
+ * they do not count as unfinished. */
+void vshi_chunk_march(vshi_chunk *chunk, const vshi_kernel *kernel, const vsh_field *field, int32_t kind,
+                      int32_t max_steps, vsh_shade_stats *stats);
+
 /* Fraction of a disc light that is seen past a straight edge at x of its radius from the centre, for x in
  * [-1, 1]: the circular segment 1/2 + (x √(1 - x²) + asin x) / π. Its own arithmetic, so that no libm shows
  * in the bits. */

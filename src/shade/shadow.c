@@ -126,18 +126,14 @@ static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end,
             stats->certified += cone->close >= cone->sine;
         }
     }
-    vshi_march_stats work = {0, 0};
     const bool jittered = task->options->jitter > 0.0 && method != VSH_SHADOW_IMPROVED;
     for (size_t r = 0; jittered && r < chunk.rays.count; ++r) {
         chunk.rays.pace[r] = pace_of(task, facing.point[chunk.owner[r]]);
     }
-    task->kernel->march(task->field, &chunk.rays,
-                        jittered                        ? VSHI_MARCH_JITTERED
-                        : method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED
-                                                        : VSHI_MARCH_PLAIN,
-                        task->options->max_steps, &work);
-    stats->samples += work.samples;
-    stats->unfinished += work.unfinished;
+    const int32_t kind = jittered                        ? VSHI_MARCH_JITTERED
+                         : method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED
+                                                         : VSHI_MARCH_PLAIN;
+    vshi_chunk_march(&chunk, task->kernel, task->field, kind, task->options->max_steps, stats);
     for (size_t r = 0; r < chunk.rays.count; ++r) {
         const double closeness = chunk.rays.close[r];
         const double sine = chunk.rays.sine[r];
@@ -203,7 +199,7 @@ vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *lig
     *shader = (vshi_shadow_shader){.sampler = NULL};
     VSHI_TRY(vshi_shade_options_resolve(options, &shader->options, error));
     VSHI_TRY(vsh_light_check(light, error));
-    VSHI_TRY(vshi_layers_prepare(occluders, &shader->options, light, &shader->layers, error));
+    VSHI_TRY(vshi_layers_prepare(occluders, &shader->options, light, false, &shader->layers, error));
     vshi_shade_options_settle(&shader->options, occluders->triangles);
     VSHI_TRY(vshi_shadow_prepare(occluders, light, &shader->options, &shader->task, error));
     if (vshi_shadow_has_rays(&shader->options)) {

@@ -1,10 +1,260 @@
 /* Shadow values from rays over the light's disc: all of them (rays), or as many as a cone leaves open
  * (adaptive, on the field; exact, on the triangles). */
 #include "shade/interpolation.h"
-#include "shade/shadow_cast.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <string.h>
+
+enum { PACKET_POINTS = 64 };
+
+/* --- points whose values take rays, and those rays on their way: marched, or traced against triangles or the
+ * field's surface, alone or in packets of several points */
+
+/* A point whose value takes rays. */
+typedef struct open_point {
+    size_t point;
+    vshi_vec origin, normal; /* field space; no normal: zero */
+    vshi_vec axis, u, v;     /* towards the light, and over its disc a unit away; exact: in world space */
+    vshi_vec start;          /* exact: of its rays, world space */
+    vshi_light_view view;    /* a light with a shape, as the point itself sees it */
+    vshi_vec off;            /* from that point to where its rays begin, in the rays' space */
+    double end;
+    bool traced; /* its rays, against triangles or the field's surface; else they are marched */
+    int32_t lit, taken;
+    bool near; /* traced: near enough to the triangles for packets */
+    double deviation;
+} open_point;
+
+typedef struct ray_batch {
+    const vshi_shadow_task *task;
+    open_point *open;
+    size_t open_count;
+    vshi_chunk chunk;
+    vshi_segment_ray traced[VSHI_CHUNK];
+    bool blocked[VSHI_CHUNK];
+    uint16_t traced_owner[VSHI_CHUNK];
+    size_t traced_count;
+    bool shared; /* points share their rays */
+    vsh_shade_stats *stats;
+} ray_batch;
+
+/* Whether all rays of a point are the same. */
+static bool is_hard(const vshi_shadow_task *task) {
+    return vshi_light_is_point(&task->place);
+}
+
+/* Rays on triangles begin this part of the casters' size off the surface: above the rounding of floats, below
+ * what shows. */
+static const double TRACE_LIFT = 0x1p-18;
+
+/* The triangles that rays meet: the casters' in world space, or the field's surface in its own. */
+static const vsh_triangles *traced_of(const vshi_shadow_task *task) {
+    return task->options->method == VSH_SHADOW_EXACT ? task->triangles : task->field->surface;
+}
+
+/* The origin of a point's traced rays, in the space of these triangles. */
+static vshi_vec begin_of(const vshi_shadow_task *task, const open_point *p) {
+    return task->options->method == VSH_SHADOW_EXACT ? p->start : p->origin;
+}
+
+static void flush(ray_batch *batch) {
+    const vshi_shadow_task *task = batch->task;
+    vshi_chunk_march(&batch->chunk, task->kernel, task->field, VSHI_MARCH_PLAIN, task->options->max_steps,
+                     batch->stats);
+    for (size_t r = 0; r < batch->chunk.rays.count; ++r) {
+        batch->open[batch->chunk.owner[r]].lit += batch->chunk.rays.close[r] > 0.0f;
+    }
+    vshi_chunk_clear(&batch->chunk);
+    if (batch->traced_count > 0) {
+        vshi_triangles_blocked(traced_of(task), batch->traced, batch->traced_count, batch->blocked);
+        for (size_t r = 0; r < batch->traced_count; ++r) {
+            batch->open[batch->traced_owner[r]].lit += !batch->blocked[r];
+        }
+        batch->traced_count = 0;
+    }
+}
+
+/* Turns an open point to world space, off its surface by TRACE_LIFT. */
+static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
+    const double tangent = vshi_length(p->u);
+    const double *at = task->points->positions + 3 * p->point;
+    double size = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double side = task->field->world_max[axis] - task->field->world_min[axis];
+        size = side > size ? side : size;
+    }
+    const double lift = TRACE_LIFT * size + task->options->surface_offset;
+    p->normal = vshi_direction_to_world(task->field, p->normal);
+    p->axis = vshi_direction_to_world(task->field, p->axis);
+    p->u = vshi_scale(vshi_direction_to_world(task->field, p->u), tangent);
+    p->v = vshi_scale(vshi_direction_to_world(task->field, p->v), tangent);
+    p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
+    vshi_light_view view;
+    p->end = vshi_light_look(&task->world, p->start, false, &view) == VSHI_LIGHT_SEEN ? view.end : 0.0;
+}
+
+/* Looks at a light that is no disc, in the space of the rays. */
+static void look_at_shape(const vshi_shadow_task *task, open_point *p) {
+    const double *at = task->points->positions + 3 * p->point;
+    const bool traced = task->options->method == VSH_SHADOW_EXACT;
+    const vshi_vec from = traced ? vshi_vec_of(at) : vshi_to_field(task->field, at);
+    vshi_light_look(traced ? &task->world : &task->place, from, false, &p->view);
+    p->off = vshi_sub(traced ? p->start : p->origin, from);
+}
+
+/* Unit direction of the ray to a place on the unit disc, and how far it goes; false below the horizon. */
+static bool direct(const vshi_shadow_task *task, const open_point *p, const double disc[2], vshi_vec *d,
+                   double *end) {
+    const bool horizon = task->points->normals != NULL;
+    const vshi_light_shape *shape = task->place.shape;
+    *end = p->end;
+    if (shape == NULL) {
+        *d = vshi_unit(vshi_add(p->axis, vshi_add(vshi_scale(p->u, disc[0]), vshi_scale(p->v, disc[1]))));
+        return !(horizon && vshi_dot(*d, p->normal) <= 0.0);
+    }
+    const bool traced = task->options->method == VSH_SHADOW_EXACT;
+    const vshi_vec way = shape->ray(traced ? &task->world : &task->place, &p->view, disc);
+    const vshi_vec to = vshi_sub(way, p->off);
+    const double length = vshi_length(to), ahead = vshi_dot(to, p->axis);
+    *d = vshi_unit(to);
+    /* a proof ends the cone early, at a depth along its axis */
+    *end = !traced && ahead > p->end ? length * p->end / ahead : length;
+    return !(horizon && vshi_dot(way, p->normal) <= 0.0);
+}
+
+static uint32_t texel_of(const vshi_shadow_task *task, const open_point *p) {
+    return task->points->texels != NULL ? task->points->texels[p->point] : (uint32_t)p->point;
+}
+
+/* Rays taken … target - 1 of an open point. */
+static void cast(ray_batch *batch, size_t owner, int32_t target) {
+    const vshi_shadow_task *task = batch->task;
+    open_point *p = &batch->open[owner];
+    const uint32_t texel = texel_of(task, p);
+    double disc[64][2];
+    while (p->taken < target) {
+        const int32_t count = target - p->taken < 64 ? target - p->taken : 64;
+        vshi_sampler_disc(task->sampler, texel, task->purpose, p->taken, count, disc);
+        p->taken += count;
+        batch->stats->rays += (uint64_t)count;
+        for (int32_t i = 0; i < count; ++i) {
+            vshi_vec d;
+            double end;
+            if (!direct(task, p, disc[i], &d, &end)) {
+                continue;
+            }
+            if (batch->chunk.rays.count == VSHI_CHUNK || batch->traced_count == VSHI_CHUNK) {
+                flush(batch);
+            }
+            if (p->traced) {
+                const vshi_vec from = begin_of(task, p);
+                batch->traced[batch->traced_count] = (vshi_segment_ray){
+                    .origin = {from.x, from.y, from.z}, .direction = {d.x, d.y, d.z}, .far = end};
+                batch->traced_owner[batch->traced_count++] = (uint16_t)owner;
+                continue;
+            }
+            const vshi_cone ray = {
+                .origin = p->origin, .direction = d, .end = end, .sine = 0.0, .close = 1.0};
+            p->lit += !vshi_chunk_add(&batch->chunk, task->field, &ray, (uint32_t)owner, batch->stats);
+        }
+    }
+}
+
+/* Whether the rays of open points are traced in packets of several points each: discs, and the sampler's
+ * blocks. */
+static bool in_packets(const vshi_shadow_task *task) {
+    return task->place.shape == NULL && task->options->sampler == VSH_SAMPLER_SOBOL && !is_hard(task);
+}
+
+/* Rays first … last - 1 of open points that have `first`. */
+static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int32_t first, int32_t last) {
+    const vshi_shadow_task *task = batch->task;
+    vshi_disc discs[PACKET_POINTS];
+    int32_t lit[PACKET_POINTS];
+    for (size_t begin = 0; begin < count; begin += PACKET_POINTS) {
+        const size_t points = count - begin < PACKET_POINTS ? count - begin : PACKET_POINTS;
+        for (size_t i = 0; i < points; ++i) {
+            const open_point *p = &batch->open[some[begin + i]];
+            const vshi_vec from = begin_of(task, p);
+            discs[i] = (vshi_disc){.origin = {from.x, from.y, from.z},
+                                   .axis = p->axis,
+                                   .u = p->u,
+                                   .v = p->v,
+                                   .normal = p->normal,
+                                   .far = p->end};
+            vshi_sampler_shift(task->sampler, texel_of(task, p), task->purpose, discs[i].shift);
+            lit[i] = 0;
+        }
+        vshi_triangles_discs(traced_of(task), task->sampler, false, discs, points, first, last, lit);
+        for (size_t i = 0; i < points; ++i) {
+            open_point *p = &batch->open[some[begin + i]];
+            p->lit += lit[i];
+            p->taken = last;
+        }
+        batch->stats->rays += points * (uint64_t)(last - first);
+    }
+}
+
+/* Sets *p to point `point` of the task, whose cone is not proved; without a normal that is zero. */
+static void begin_open_point(const vshi_shadow_task *task, size_t point, const vshi_cone *cone,
+                             vshi_vec normal, open_point *p) {
+    const double tangent = cone->sine / sqrt(1.0 - cone->sine * cone->sine);
+    *p = (open_point){
+        .point = point, .origin = cone->origin, .normal = normal, .axis = cone->direction, .end = cone->end};
+    vshi_frame(cone->direction, &p->u, &p->v);
+    p->u = vshi_scale(p->u, tangent);
+    p->v = vshi_scale(p->v, tangent);
+    p->traced = task->options->method == VSH_SHADOW_EXACT ||
+                (task->options->method == VSH_SHADOW_ADAPTIVE && vshi_shade_traces(task->field, p->origin));
+    if (task->options->method == VSH_SHADOW_EXACT) {
+        turn_to_world(task, p);
+    }
+    if (p->traced) {
+        const vshi_vec from = begin_of(task, p);
+        p->near = vshi_triangles_sees(traced_of(task), (double[]){from.x, from.y, from.z});
+    }
+    if (task->place.shape != NULL) {
+        look_at_shape(task, p);
+    }
+}
+
+/* Of some open points the most rays that one has below `limit`; -1: none has. */
+static int32_t most_below(const ray_batch *batch, const size_t *some, size_t count, int32_t limit) {
+    int32_t most = -1;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t taken = batch->open[some[i]].taken;
+        most = taken < limit && taken > most ? taken : most;
+    }
+    return most;
+}
+
+/* Rays up to `target` of those of some open points that have `taken`. */
+static void cast_alike(ray_batch *batch, const size_t *some, size_t count, int32_t taken, int32_t target) {
+    const bool packets = in_packets(batch->task) && vshi_sampler_is_blocks(taken, target);
+    size_t alike[VSHI_PIECE], same = 0;
+    for (size_t i = 0; i < count; ++i) {
+        const open_point *p = &batch->open[some[i]];
+        if (p->taken == taken && packets && p->traced && p->near) {
+            alike[same++] = some[i];
+        } else if (p->taken == taken) {
+            cast(batch, some[i], target);
+        }
+    }
+    cast_packets(batch, alike, same, taken, target);
+}
+
+/* Casts rays for those of the open points that some[count] lists, until each has `most`, or (`doubling`)
+ * twice as many as it has, `most` at most. */
+static void cast_all(ray_batch *batch, const size_t *some, size_t count, int32_t most, bool doubling) {
+    int32_t taken = most;
+    while ((taken = most_below(batch, some, count, taken)) >= 0) {
+        cast_alike(batch, some, count, taken, doubling && 2 * taken < most ? 2 * taken : most);
+    }
+    flush(batch);
+}
+
+/* --- the number of rays of each point */
 
 enum { FIRST_ROUND = 8 };
 
@@ -25,8 +275,8 @@ typedef struct around {
     double lit, taken;
 } around;
 
-static around look_around(const vshi_ray_batch *batch, size_t owner) {
-    const vshi_open_point *open = batch->open, *p = &open[owner];
+static around look_around(const ray_batch *batch, size_t owner) {
+    const open_point *open = batch->open, *p = &open[owner];
     const size_t first = owner > AROUND ? owner - AROUND : 0;
     const size_t last = owner + AROUND < batch->open_count ? owner + AROUND : batch->open_count - 1;
     around a = {0.0, 0.0};
@@ -42,8 +292,8 @@ static around look_around(const vshi_ray_batch *batch, size_t owner) {
 
 /* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed
  * by Laplace's rule of succession), or a half where none is near. */
-static double deviation_of(const vshi_ray_batch *batch, size_t owner) {
-    const vshi_open_point *p = &batch->open[owner];
+static double deviation_of(const ray_batch *batch, size_t owner) {
+    const open_point *p = &batch->open[owner];
     const around a = look_around(batch, owner);
     const double deviation =
         vshi_rays_deviation(batch->task->options->sampler, p->lit, p->taken, (a.lit + 1.0) / (a.taken + 2.0));
@@ -52,18 +302,18 @@ static double deviation_of(const vshi_ray_batch *batch, size_t owner) {
 
 /* The same, as it is said, and as errors below VSHI_COARSE are kept: the other leaves more unseen at the ends
  * of penumbrae than such an error. */
-static double error_of(const vshi_ray_batch *batch, size_t owner) {
-    const vshi_open_point *p = &batch->open[owner];
+static double error_of(const ray_batch *batch, size_t owner) {
+    const open_point *p = &batch->open[owner];
     const around a = look_around(batch, owner);
     return vshi_rays_error(batch->task->options->sampler, p->lit, p->taken, a.lit, a.taken);
 }
 
 /* Casts rays for some open points, twice as many in each round for those that are not known well enough, by
  * then: what is found of one tells of those around it. */
-static void cast_fine(vshi_ray_batch *batch, const size_t *some, size_t count, int32_t most) {
+static void cast_fine(ray_batch *batch, const size_t *some, size_t count, int32_t most) {
     const vsh_shade_options *options = batch->task->options;
     size_t unsettled[VSHI_PIECE], left = count;
-    vshi_shadow_cast_all(batch, some, count, FIRST_ROUND < most ? FIRST_ROUND : most);
+    cast_all(batch, some, count, FIRST_ROUND < most ? FIRST_ROUND : most, false);
     while (left > 0) {
         left = 0;
         for (size_t i = 0; i < count; ++i) {
@@ -72,16 +322,16 @@ static void cast_fine(vshi_ray_batch *batch, const size_t *some, size_t count, i
                 unsettled[left++] = some[i];
             }
         }
-        vshi_shadow_cast_double(batch, unsettled, left, most);
+        cast_all(batch, unsettled, left, most, true);
     }
 }
 
 /* Casts rays for some open points, all up to the first target, then twice as many in each round for those
  * that are not settled. */
-static void cast_rounds(vshi_ray_batch *batch, const size_t *some, size_t count) {
+static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
     const vsh_shade_options *options = batch->task->options;
     const bool refining = options->method != VSH_SHADOW_RAYS;
-    const bool hard = vshi_shadow_is_hard(batch->task);
+    const bool hard = is_hard(batch->task);
     const int32_t most = hard ? 1 : vshi_shadow_most_rays(options);
     int32_t target = refining ? FIRST_ROUND : options->early_rays > 0 ? options->early_rays : most;
     size_t unsettled[VSHI_PIECE];
@@ -92,11 +342,11 @@ static void cast_rounds(vshi_ray_batch *batch, const size_t *some, size_t count)
     memcpy(unsettled, some, count * sizeof *some);
     while (count > 0) {
         target = target < most ? target : most;
-        vshi_shadow_cast_all(batch, unsettled, count, target);
+        cast_all(batch, unsettled, count, target, false);
         size_t left = 0;
         for (size_t i = 0; i < count; ++i) {
             const size_t o = unsettled[i];
-            vshi_open_point *p = &batch->open[o];
+            open_point *p = &batch->open[o];
             p->deviation = hard ? 0.0 : deviation_of(batch, o);
             const bool settled =
                 refining ? p->deviation <= options->max_error : p->lit == 0 || p->lit == p->taken;
@@ -109,7 +359,7 @@ static void cast_rounds(vshi_ray_batch *batch, const size_t *some, size_t count)
     }
 }
 
-static void settle(vshi_ray_batch *batch, size_t point, float value, float deviation) {
+static void settle(ray_batch *batch, size_t point, float value, float deviation) {
     vshi_shadow_settle(batch->task, point, value, deviation);
     vshi_stats_add_error(batch->stats, (double)deviation);
 }
@@ -117,10 +367,10 @@ static void settle(vshi_ray_batch *batch, size_t point, float value, float devia
 /* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
  * the ends of penumbrae too well: where all rays agree, of points that others may be interpolated from and of
  * samplers that leave more, the larger of the two is said, of the latter at most what was asked for. */
-static double said_of(const vshi_ray_batch *batch, size_t owner) {
+static double said_of(const ray_batch *batch, size_t owner) {
     const vsh_shade_options *options = batch->task->options;
-    const vshi_open_point *p = &batch->open[owner];
-    if (options->method == VSH_SHADOW_RAYS || vshi_shadow_is_hard(batch->task)) {
+    const open_point *p = &batch->open[owner];
+    if (options->method == VSH_SHADOW_RAYS || is_hard(batch->task)) {
         return p->deviation;
     }
     if (options->max_error < VSHI_COARSE) {
@@ -132,9 +382,9 @@ static double said_of(const vshi_ray_batch *batch, size_t owner) {
                : p->deviation;
 }
 
-static void settle_cast(vshi_ray_batch *batch, const size_t *some, size_t count) {
+static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
     for (size_t i = 0; i < count; ++i) {
-        vshi_open_point *p = &batch->open[some[i]];
+        open_point *p = &batch->open[some[i]];
         p->deviation = said_of(batch, some[i]);
         settle(batch, p->point, (float)p->lit / (float)p->taken, (float)p->deviation);
     }
@@ -142,7 +392,7 @@ static void settle_cast(vshi_ray_batch *batch, const size_t *some, size_t count)
 
 /* Casts rays for those of the open points, which `some` lists, that the others can be interpolated from,
  * interpolates these, and leaves the rest in `some`. Returns their number. */
-static size_t cast_shared(vshi_ray_batch *batch, size_t begin, size_t end, size_t *some) {
+static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
     const vshi_shadow_task *task = batch->task;
     vshi_interpolation interp = {.points = task->points,
                                  .begin = begin,
@@ -156,7 +406,7 @@ static size_t cast_shared(vshi_ray_batch *batch, size_t begin, size_t end, size_
         interp.state[k] =
             (uint8_t)(isnan(interp.value[k]) ? VSHI_INTERPOLATION_GONE : VSHI_INTERPOLATION_KNOWN);
     }
-    vshi_shadow_cast_all(batch, some, batch->open_count, interp.rays);
+    cast_all(batch, some, batch->open_count, interp.rays, false);
     for (size_t o = 0; o < batch->open_count; ++o) {
         const size_t k = batch->open[o].point - begin;
         interp.state[k] = VSHI_INTERPOLATION_OPEN;
@@ -176,7 +426,7 @@ static size_t cast_shared(vshi_ray_batch *batch, size_t begin, size_t end, size_
         cast_rounds(batch, some, wanted);
         settle_cast(batch, some, wanted);
         for (size_t i = 0; i < wanted; ++i) {
-            const vshi_open_point *p = &batch->open[some[i]];
+            const open_point *p = &batch->open[some[i]];
             const size_t k = p->point - begin;
             anchor[some[i]] = true;
             interp.state[k] = VSHI_INTERPOLATION_KNOWN;
@@ -198,7 +448,7 @@ static size_t cast_shared(vshi_ray_batch *batch, size_t begin, size_t end, size_
 }
 
 /* Proves cones free or full, and drops those points. */
-static void prove(vshi_ray_batch *batch, vshi_facing *facing) {
+static void prove(ray_batch *batch, vshi_facing *facing) {
     const vshi_shadow_task *task = batch->task;
     for (size_t i = 0; i < facing->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
@@ -221,9 +471,8 @@ static void prove(vshi_ray_batch *batch, vshi_facing *facing) {
             ++batch->stats->certified;
         }
     }
-    vshi_march_stats work = {0, 0};
-    task->kernel->march(task->field, &batch->chunk.rays, VSHI_MARCH_PROOF, task->options->max_steps, &work);
-    batch->stats->samples += work.samples;
+    vshi_chunk_march(&batch->chunk, task->kernel, task->field, VSHI_MARCH_PROOF, task->options->max_steps,
+                     batch->stats);
     for (size_t r = 0; r < batch->chunk.rays.count; ++r) {
         const size_t i = batch->chunk.owner[r];
         const uint8_t proof = (uint8_t)batch->chunk.rays.proof[r];
@@ -241,8 +490,8 @@ static void prove(vshi_ray_batch *batch, vshi_facing *facing) {
 void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_shadow_task *task = user;
     vshi_facing facing;
-    vshi_open_point open[VSHI_PIECE];
-    vshi_ray_batch batch;
+    open_point open[VSHI_PIECE];
+    ray_batch batch;
     batch.task = task;
     batch.open = open;
     batch.open_count = batch.traced_count = 0;
@@ -255,8 +504,7 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
         if (facing.settled[i]) {
             continue;
         }
-        vshi_open_point_begin(task, facing.point[i], &facing.cone[i], facing.normal[i],
-                              &open[batch.open_count++]);
+        begin_open_point(task, facing.point[i], &facing.cone[i], facing.normal[i], &open[batch.open_count++]);
     }
     size_t some[VSHI_PIECE], count = batch.open_count;
     for (size_t o = 0; o < count; ++o) {
@@ -264,7 +512,7 @@ void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_s
     }
     batch.shared = task->options->method != VSH_SHADOW_RAYS &&
                    vshi_shadow_most_rays(task->options) > vshi_interpolation_rays(task->options->max_error) &&
-                   !vshi_shadow_is_hard(task) && !task->scattered && vshi_interpolation_can(task->points);
+                   !is_hard(task) && !task->scattered && vshi_interpolation_can(task->points);
     if (batch.shared) {
         count = cast_shared(&batch, begin, end, some);
     }

@@ -264,6 +264,25 @@ static bool attach(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m)
     return vertices != NULL && corners != NULL;
 }
 
+bool vshi_triangles_attach_own(const vsh_triangles *triangles, unsigned number, size_t count, void *user,
+                               RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
+                               RTCOccludedFunctionN occlude) {
+    const vshi_embree *embree = triangles->embree;
+    const RTCGeometry geometry = embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_USER);
+    if (geometry == NULL) {
+        return false;
+    }
+    embree->rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)count);
+    embree->rtcSetGeometryUserData(geometry, user);
+    embree->rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
+    embree->rtcSetGeometryIntersectFunction(geometry, intersect);
+    embree->rtcSetGeometryOccludedFunction(geometry, occlude);
+    embree->rtcCommitGeometry(geometry);
+    embree->rtcAttachGeometryByID(triangles->scene, geometry, number);
+    embree->rtcReleaseGeometry(geometry);
+    return true;
+}
+
 static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
     const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
     if (atomic_load(&triangles->refused)) {

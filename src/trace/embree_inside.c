@@ -33,14 +33,6 @@ static int8_t crosses(uint8_t solid, vshi_vec normal, vshi_vec direction) {
     return forwards == ((solid & VSHI_SOLID_SIDE) == VSHI_SOLID_BEHIND) ? 1 : -1;
 }
 
-/* Rows of N values that rays and hits are made of; Embree has names for them in C++ only. */
-enum { RAY_DIRECTION = 4, RAY_FAR = 8, HIT_NORMAL = 0, HIT_TRIANGLE = 5, HIT_MESH = 6 };
-
-static vshi_vec vector_of(const float *rows, size_t first, size_t n, size_t i) {
-    return (vshi_vec){(double)rows[first * n + i], (double)rows[(first + 1) * n + i],
-                      (double)rows[(first + 2) * n + i]};
-}
-
 /* Sheets are passed by; where all crossings are asked for, each is noted and passed by. */
 static void filter(const struct RTCFilterFunctionNArguments *args) {
     looking *look = (looking *)args->context;
@@ -52,16 +44,16 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
             continue;
         }
         const uint8_t solid =
-            vshi_triangles_solid(look->triangles, hit[HIT_MESH * n + i], hit[HIT_TRIANGLE * n + i]);
-        const vshi_vec normal = vector_of((const float *)args->hit, HIT_NORMAL, n, i);
-        const int8_t out = crosses(solid, normal, vector_of(ray, RAY_DIRECTION, n, i));
+            vshi_triangles_solid(look->triangles, hit[VSHI_HIT_MESH * n + i], hit[VSHI_HIT_TRIANGLE * n + i]);
+        const int8_t out = crosses(solid, vshi_packet_vector(args->hit, VSHI_HIT_NORMAL, n, i),
+                                   vshi_packet_vector(ray, VSHI_RAY_DIRECTION, n, i));
         const bool vessel = (solid & VSHI_SOLID_VESSEL) != 0;
         const bool sheet = vessel ? !look->vessels : solid == VSHI_AIR_AROUND;
         if (sheet || look->crossings != NULL) {
             args->valid[i] = 0;
         }
         if (!sheet && look->crossings != NULL && look->count < MOST_CROSSINGS) {
-            look->crossings[look->count++] = (crossing){ray[RAY_FAR * n + i], out};
+            look->crossings[look->count++] = (crossing){ray[VSHI_RAY_FAR * n + i], out};
         }
     }
 }

@@ -7,16 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Rows of N values that rays and hits are made of; Embree has names for them in C++ only. */
-enum { RAY_ORIGIN = 0, RAY_DIRECTION = 4, HIT_TRIANGLE = 5 };
-
 static vshi_vec vertex(const vshi_sieve *sieve, uint32_t number) {
     return vshi_vec_off(sieve->vertices + 3 * (size_t)number);
-}
-
-static vshi_vec row(const float *ray, size_t first, size_t n, size_t i) {
-    return (vshi_vec){(double)ray[first * n + i], (double)ray[(first + 1) * n + i],
-                      (double)ray[(first + 2) * n + i]};
 }
 
 /* Whether a ray passes through a triangle that it meets. By the ray and the triangle alone, in double: where
@@ -56,14 +48,14 @@ static void filter(const struct RTCFilterFunctionNArguments *args) {
         return;
     }
     const size_t n = args->N;
-    const float *ray = (const float *)args->ray;
     const unsigned *hit = (const unsigned *)args->hit;
     for (size_t i = 0; i < n; ++i) {
         if (args->valid[i] != -1) {
             continue;
         }
-        if (passes(sieve, hit[HIT_TRIANGLE * n + i], row(ray, RAY_ORIGIN, n, i),
-                   row(ray, RAY_DIRECTION, n, i))) {
+        if (passes(sieve, hit[VSHI_HIT_TRIANGLE * n + i],
+                   vshi_packet_vector(args->ray, VSHI_RAY_ORIGIN, n, i),
+                   vshi_packet_vector(args->ray, VSHI_RAY_DIRECTION, n, i))) {
             args->valid[i] = 0;
         }
     }

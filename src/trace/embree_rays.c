@@ -127,8 +127,6 @@ void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_r
 /* An Embree filter: lets rays pass the fronts of triangles. A solid's faces look away from it, also where a
  * transform mirrors them; those of sheets look as their corners turn. */
 static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
-    /* rows of N values; Embree has names for them in C++ only */
-    enum { RAY_DIRECTION = 4, HIT_NORMAL = 0, HIT_TRIANGLE = 5, HIT_MESH = 6 };
     const vsh_triangles *triangles = ((const blocking *)args->context)->triangles;
     const size_t n = args->N;
     const float *ray = (const float *)args->ray, *hit = (const float *)args->hit;
@@ -139,10 +137,11 @@ static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
         }
         float along = 0.0f;
         for (size_t axis = 0; axis < 3; ++axis) {
-            along += ray[(RAY_DIRECTION + axis) * n + i] * hit[(HIT_NORMAL + axis) * n + i];
+            along += ray[(VSHI_RAY_DIRECTION + axis) * n + i] * hit[(VSHI_HIT_NORMAL + axis) * n + i];
         }
         const uint8_t solid =
-            vshi_triangles_solid(triangles, of[HIT_MESH * n + i], of[HIT_TRIANGLE * n + i]) & VSHI_SOLID_SIDE;
+            vshi_triangles_solid(triangles, of[VSHI_HIT_MESH * n + i], of[VSHI_HIT_TRIANGLE * n + i]) &
+            VSHI_SOLID_SIDE;
         if (!(solid == VSHI_SOLID_BEFORE ? along < 0.0f : along > 0.0f)) {
             args->valid[i] = 0;
         }

@@ -116,6 +116,23 @@ static inline uint8_t vshi_triangles_solid(const vsh_triangles *triangles, unsig
                                             : triangles->solid[triangles->first[mesh] + local];
 }
 
+/* Rows of N values that the rays and hits of a packet are made of; Embree has names for them in C++ only. A
+ * hit's rows follow those of its ray. */
+enum { VSHI_RAY_ORIGIN = 0, VSHI_RAY_NEAR = 3, VSHI_RAY_DIRECTION = 4, VSHI_RAY_FAR = 8, VSHI_RAY_ROWS = 12 };
+enum { VSHI_HIT_NORMAL = 0, VSHI_HIT_U = 3, VSHI_HIT_V = 4, VSHI_HIT_TRIANGLE = 5, VSHI_HIT_MESH = 6 };
+
+/* The vector of lane `lane` in the three rows from `row` on. */
+static inline vshi_vec vshi_packet_vector(const void *packet, size_t row, size_t lanes, size_t lane) {
+    const float *at = (const float *)packet + row * lanes + lane;
+    return (vshi_vec){(double)at[0], (double)at[lanes], (double)at[2 * lanes]};
+}
+
+/* Adds a geometry of `count` primitives that are no triangles, as geometry `number` of the scene; false where
+ * Embree refuses: its error says why. */
+bool vshi_triangles_attach_own(const vsh_triangles *triangles, unsigned number, size_t count, void *user,
+                               RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
+                               RTCOccludedFunctionN occlude);
+
 /* How packets go on: all rays together, or (where they go apart) each by itself. Terrains follow a packet's
  * rays all at once in any case. */
 static inline enum RTCIntersectContextFlags vshi_triangles_flags(const vsh_triangles *triangles,

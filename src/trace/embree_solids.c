@@ -26,16 +26,13 @@ static void find_bounds(const struct RTCBoundsFunctionArguments *args) {
                                          .upper_z = scaled[1][2]};
 }
 
-/* Rows of N values that rays are made of; Embree has names for them in C++ only. */
-enum { RAY_ORIGIN = 0, RAY_DIRECTION = 4, RAY_FAR = 8, HIT_TRIANGLE = 17, HIT_MESH = 18 };
-
 /* How far lane i's ray goes until it meets a part, the scene's units; infinite where it does not. */
 static float meet(const vsh_triangles *triangles, unsigned part, const float *ray, size_t n, size_t i) {
-    vshi_segment_ray world = {.far = (double)ray[RAY_FAR * n + i] / triangles->scale};
+    vshi_segment_ray world = {.far = (double)ray[VSHI_RAY_FAR * n + i] / triangles->scale};
     for (size_t axis = 0; axis < 3; ++axis) {
         world.origin[axis] =
-            (double)ray[(RAY_ORIGIN + axis) * n + i] / triangles->scale + triangles->centre[axis];
-        world.direction[axis] = (double)ray[(RAY_DIRECTION + axis) * n + i];
+            (double)ray[(VSHI_RAY_ORIGIN + axis) * n + i] / triangles->scale + triangles->centre[axis];
+        world.direction[axis] = (double)ray[(VSHI_RAY_DIRECTION + axis) * n + i];
     }
     return (float)(vshi_solids_part_meet(triangles->solids, part, &world) * triangles->scale);
 }
@@ -45,7 +42,7 @@ static void occlude(const struct RTCOccludedFunctionNArguments *args) {
     float *ray = (float *)args->ray;
     for (size_t i = 0; i < args->N; ++i) {
         if (args->valid[i] == -1 && meet(args->geometryUserPtr, args->primID, ray, args->N, i) < INFINITY) {
-            ray[RAY_FAR * args->N + i] = -INFINITY;
+            ray[VSHI_RAY_FAR * args->N + i] = -INFINITY;
         }
     }
 }
@@ -60,27 +57,15 @@ static void intersect(const struct RTCIntersectFunctionNArguments *args) {
         const float met =
             args->valid[i] == -1 ? meet(args->geometryUserPtr, args->primID, ray, n, i) : INFINITY;
         if (met < INFINITY) {
-            ray[RAY_FAR * n + i] = met;
-            hit[HIT_TRIANGLE * n + i] = args->primID;
-            hit[HIT_MESH * n + i] = args->geomID;
+            ray[VSHI_RAY_FAR * n + i] = met;
+            hit[(VSHI_RAY_ROWS + VSHI_HIT_TRIANGLE) * n + i] = args->primID;
+            hit[(VSHI_RAY_ROWS + VSHI_HIT_MESH) * n + i] = args->geomID;
         }
     }
 }
 
 bool vshi_triangles_attach_solids(vsh_triangles *triangles) {
-    const vshi_embree *embree = triangles->embree;
-    const RTCGeometry geometry = embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_USER);
-    if (geometry == NULL) {
-        return false;
-    }
-    embree->rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)vshi_solids_part_count(triangles->solids));
-    embree->rtcSetGeometryUserData(geometry, triangles);
-    embree->rtcSetGeometryBoundsFunction(geometry, find_bounds, NULL);
-    embree->rtcSetGeometryIntersectFunction(geometry, intersect);
-    embree->rtcSetGeometryOccludedFunction(geometry, occlude);
-    embree->rtcCommitGeometry(geometry);
-    embree->rtcAttachGeometryByID(triangles->scene, geometry,
-                                  (unsigned)(triangles->first_terrain + triangles->terrain_count));
-    embree->rtcReleaseGeometry(geometry);
-    return true;
+    const unsigned number = triangles->first_terrain + (unsigned)triangles->terrain_count;
+    return vshi_triangles_attach_own(triangles, number, vshi_solids_part_count(triangles->solids), triangles,
+                                     find_bounds, intersect, occlude);
 }

@@ -7,10 +7,6 @@
 
 enum { LANES = VSHI_TERRAIN_LANES };
 
-/* Rows of N values that rays and hits are made of; Embree has names for them in C++ only. */
-enum { RAY_ORIGIN = 0, RAY_NEAR = 3, RAY_DIRECTION = 4, RAY_FAR = 8, RAY_ROWS = 12 };
-enum { HIT_NORMAL = 0, HIT_U = 3, HIT_V = 4, HIT_TRIANGLE = 5, HIT_MESH = 6 };
-
 /* The search for the next crossing begins so many cells beyond one. */
 static const double PAST = 1e-4;
 
@@ -40,10 +36,10 @@ static void aim(const vshi_relief *relief, const float *ray, size_t n, size_t i,
                 vshi_terrain_rays *rays, size_t lane) {
     float origin[3], direction[3];
     for (size_t axis = 0; axis < 3; ++axis) {
-        origin[axis] = ray[(RAY_ORIGIN + axis) * n + i];
-        direction[axis] = ray[(RAY_DIRECTION + axis) * n + i];
+        origin[axis] = ray[(VSHI_RAY_ORIGIN + axis) * n + i];
+        direction[axis] = ray[(VSHI_RAY_DIRECTION + axis) * n + i];
     }
-    vshi_terrain_aim(relief, origin, direction, from, (double)ray[RAY_FAR * n + i], (int)lane, rays);
+    vshi_terrain_aim(relief, origin, direction, from, (double)ray[VSHI_RAY_FAR * n + i], (int)lane, rays);
 }
 
 /* Aims the rays of a packet that are valid. */
@@ -51,7 +47,7 @@ static void aim_all(const vshi_relief *relief, const int *valid, const float *ra
                     vshi_terrain_rays *rays) {
     for (size_t i = 0; i < LANES; ++i) {
         if (i < n && valid[i] == -1) {
-            aim(relief, ray, n, i, (double)ray[RAY_NEAR * n + i], rays, i);
+            aim(relief, ray, n, i, (double)ray[VSHI_RAY_NEAR * n + i], rays, i);
         } else {
             vshi_terrain_leave(rays, (int)i);
         }
@@ -68,11 +64,11 @@ static bool is_taken(const vshi_terrain_part *part, struct RTCIntersectContext *
     if (context->filter == NULL) {
         return true;
     }
-    float one[RAY_ROWS];
-    for (size_t row = 0; row < RAY_ROWS; ++row) {
+    float one[VSHI_RAY_ROWS];
+    for (size_t row = 0; row < VSHI_RAY_ROWS; ++row) {
         one[row] = ray[row * n + i];
     }
-    one[RAY_FAR] = (float)length;
+    one[VSHI_RAY_FAR] = (float)length;
     struct RTCHit hit = {.Ng_x = (float)normal.x,
                          .Ng_y = (float)normal.y,
                          .Ng_z = (float)normal.z,
@@ -132,7 +128,7 @@ static void occlude(const struct RTCOccludedFunctionNArguments *args) {
         if (args->valid[i] == -1 && rays.hit[i] < INFINITY &&
             (args->context->filter == NULL ||
              find_taken(part, args->context, ray, n, i, args->geomID, &rays, &length, &normal))) {
-            ray[RAY_FAR * n + i] = -INFINITY;
+            ray[VSHI_RAY_FAR * n + i] = -INFINITY;
         }
     }
 }
@@ -140,7 +136,7 @@ static void occlude(const struct RTCOccludedFunctionNArguments *args) {
 static void intersect(const struct RTCIntersectFunctionNArguments *args) {
     const vshi_terrain_part *part = args->geometryUserPtr;
     const size_t n = args->N;
-    float *ray = (float *)args->rayhit, *hit = ray + RAY_ROWS * n;
+    float *ray = (float *)args->rayhit, *hit = ray + VSHI_RAY_ROWS * n;
     vshi_terrain_rays rays;
     aim_all(&part->relief, args->valid, ray, n, &rays);
     vshi_terrain_trace(&part->relief, &rays);
@@ -151,29 +147,17 @@ static void intersect(const struct RTCIntersectFunctionNArguments *args) {
             !find_taken(part, args->context, ray, n, i, args->geomID, &rays, &length, &normal)) {
             continue;
         }
-        ray[RAY_FAR * n + i] = (float)length;
-        hit[HIT_NORMAL * n + i] = (float)normal.x;
-        hit[(HIT_NORMAL + 1) * n + i] = (float)normal.y;
-        hit[(HIT_NORMAL + 2) * n + i] = (float)normal.z;
-        hit[HIT_U * n + i] = hit[HIT_V * n + i] = 0.0f;
-        ((unsigned *)hit)[HIT_TRIANGLE * n + i] = 0;
-        ((unsigned *)hit)[HIT_MESH * n + i] = args->geomID;
+        ray[VSHI_RAY_FAR * n + i] = (float)length;
+        hit[VSHI_HIT_NORMAL * n + i] = (float)normal.x;
+        hit[(VSHI_HIT_NORMAL + 1) * n + i] = (float)normal.y;
+        hit[(VSHI_HIT_NORMAL + 2) * n + i] = (float)normal.z;
+        hit[VSHI_HIT_U * n + i] = hit[VSHI_HIT_V * n + i] = 0.0f;
+        ((unsigned *)hit)[VSHI_HIT_TRIANGLE * n + i] = 0;
+        ((unsigned *)hit)[VSHI_HIT_MESH * n + i] = args->geomID;
     }
 }
 
 bool vshi_terrain_attach(const vsh_triangles *triangles, size_t number) {
-    const vshi_embree *embree = triangles->embree;
-    const RTCGeometry geometry = embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_USER);
-    if (geometry == NULL) {
-        return false;
-    }
-    embree->rtcSetGeometryUserPrimitiveCount(geometry, 1);
-    embree->rtcSetGeometryUserData(geometry, &triangles->terrains[number]);
-    embree->rtcSetGeometryBoundsFunction(geometry, find_bounds, NULL);
-    embree->rtcSetGeometryIntersectFunction(geometry, intersect);
-    embree->rtcSetGeometryOccludedFunction(geometry, occlude);
-    embree->rtcCommitGeometry(geometry);
-    embree->rtcAttachGeometryByID(triangles->scene, geometry, triangles->first_terrain + (unsigned)number);
-    embree->rtcReleaseGeometry(geometry);
-    return true;
+    return vshi_triangles_attach_own(triangles, triangles->first_terrain + (unsigned)number, 1,
+                                     &triangles->terrains[number], find_bounds, intersect, occlude);
 }

@@ -156,18 +156,7 @@ void vshi_terrain_leave(vshi_terrain_rays *rays, int lane) {
 }
 
 void vshi_terrain_trace(const vshi_relief *relief, vshi_terrain_rays *rays) {
-    switch (vshi_isa_resolve(VSH_ISA_BEST)) {
-#if defined(__x86_64__)
-    case VSH_ISA_AVX512:
-        vshi_terrain_avx512(relief, rays);
-        return;
-    case VSH_ISA_AVX2:
-        vshi_terrain_avx2(relief, rays);
-        return;
-#endif
-    default:
-        vshi_terrain_base(relief, rays);
-    }
+    VSHI_KERNEL_OF(vshi_terrain, VSH_ISA_BEST)(relief, rays);
 }
 
 vshi_vec vshi_terrain_normal(const vshi_relief *r, const vshi_terrain_rays *rays, int lane, float t) {

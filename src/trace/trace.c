@@ -15,19 +15,13 @@
 
 enum { MAX_RAYS = 65536, AT_ONCE = 256, GRAIN = 64 };
 
+/* Points of a call that all shoot the same rays. */
 typedef struct tracing {
-    const vsh_triangles *triangles; /* NULL: none */
-    const vsh_solids *solids;       /* NULL: none */
+    vshi_truth truth;
     const double *positions;
     const float *normals;
-    double lift;
-    const vsh_light *light; /* NULL: AO */
-    double distance;        /* AO */
-    const vshi_vec *up;     /* AO: over this horizon alone; NULL: over the point's own */
-    int32_t rays;
-    double (*disc)[2]; /* [rays], the same for all points; NULL: each point has its own */
+    double (*disc)[2]; /* [truth.rays] */
     float *values;
-    vshi_light_place place; /* of the light */
 } tracing;
 
 /* A light as a disc a unit away: its radius, and the most that a ray goes along it. */
@@ -45,8 +39,9 @@ typedef struct target {
  * ring has its share. */
 static void place(tracing *task) {
     static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
-    for (int32_t i = 0; i < task->rays; ++i) {
-        const double radius = sqrt((i + 0.5) / task->rays), angle = 2.0 * PI * fmod(i * TURN, 1.0);
+    const int32_t rays = task->truth.rays;
+    for (int32_t i = 0; i < rays; ++i) {
+        const double radius = sqrt((i + 0.5) / rays), angle = 2.0 * PI * fmod(i * TURN, 1.0);
         task->disc[i][0] = radius * vshi_cos(angle);
         task->disc[i][1] = radius * vshi_sin(angle);
     }
@@ -90,13 +85,13 @@ static bool direct_to_shape(const vshi_light_place *place, const target *t, cons
 
 /* The direction of a place on the unit disc, and how far it goes; false below the horizon of `normal` (NULL:
  * none). */
-static bool direct(const tracing *task, const target *t, const double disc[2], const vshi_vec *normal,
+static bool direct(const vshi_truth *truth, const target *t, const double disc[2], const vshi_vec *normal,
                    vshi_segment_ray *ray) {
-    if (task->place.shape != NULL) {
-        return direct_to_shape(&task->place, t, disc, normal, ray);
+    if (truth->place.shape != NULL) {
+        return direct_to_shape(&truth->place, t, disc, normal, ray);
     }
     double place[2] = {disc[0] * t->radius, disc[1] * t->radius}, up, scale = 1.0;
-    if (task->light != NULL) {
+    if (truth->light != NULL) {
         scale = 1.0 / sqrt(1.0 + place[0] * place[0] + place[1] * place[1]);
         up = scale;
         ray->far = far_of(t, up);
@@ -104,7 +99,7 @@ static bool direct(const tracing *task, const target *t, const double disc[2], c
         vshi_dome_place(&t->lean, place);
         const double square = 1.0 - place[0] * place[0] - place[1] * place[1];
         up = square > 0.0 ? sqrt(square) : 0.0;
-        ray->far = task->distance;
+        ray->far = truth->distance;
     }
     const vshi_vec towards =
         vshi_add(vshi_add(vshi_scale(t->u, scale * place[0]), vshi_scale(t->v, scale * place[1])),
@@ -117,28 +112,29 @@ static bool direct(const tracing *task, const target *t, const double disc[2], c
 }
 
 /* What the solids leave of all rays to a target, as far as can be proved at once. */
-static vshi_cone_state look(const tracing *task, vshi_vec origin, const target *t) {
+static vshi_cone_state look(const vshi_truth *truth, vshi_vec origin, const target *t) {
     const double from[3] = {origin.x, origin.y, origin.z};
-    if (task->solids == NULL) {
+    if (truth->solids == NULL) {
         return VSHI_CONE_FREE;
     }
-    if (task->light == NULL) {
-        return vsh_solids_distance(task->solids, from) > task->distance ? VSHI_CONE_FREE : VSHI_CONE_UNKNOWN;
+    if (truth->light == NULL) {
+        return vsh_solids_distance(truth->solids, from) > truth->distance ? VSHI_CONE_FREE
+                                                                          : VSHI_CONE_UNKNOWN;
     }
     const double axis[3] = {t->axis.x, t->axis.y, t->axis.z}, bound = t->view.bound;
-    if (task->place.shape == NULL) {
-        return vshi_solids_cone(task->solids, from, axis, t->radius, t->distance - t->size, t->distance);
+    if (truth->place.shape == NULL) {
+        return vshi_solids_cone(truth->solids, from, axis, t->radius, t->distance - t->size, t->distance);
     }
-    return isfinite(bound) ? vshi_solids_cone(task->solids, from, axis, bound / sqrt(1.0 - bound * bound),
+    return isfinite(bound) ? vshi_solids_cone(truth->solids, from, axis, bound / sqrt(1.0 - bound * bound),
                                               t->view.near, t->view.end)
                            : VSHI_CONE_UNKNOWN;
 }
 
-static void meet(const tracing *task, const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
-                 bool *blocked) {
+static void meet(const vshi_truth *truth, const vsh_solids *solids, const vshi_segment_ray *rays,
+                 size_t count, bool *blocked) {
     memset(blocked, 0, count * sizeof *blocked);
-    if (task->triangles != NULL) {
-        vshi_triangles_blocked(task->triangles, rays, count, blocked);
+    if (truth->triangles != NULL) {
+        vshi_triangles_blocked(truth->triangles, rays, count, blocked);
     }
     if (solids != NULL) {
         vshi_solids_blocked(solids, rays, count, blocked);
@@ -154,12 +150,12 @@ typedef struct viewpoint {
 } viewpoint;
 
 /* Limits AO to the directions above the point's face; over a horizon those below it are mirrored at it. */
-static void aim_dome(const tracing *task, vshi_vec face, target *t) {
+static void aim_dome(const vshi_truth *truth, vshi_vec face, target *t) {
     vshi_frame(t->axis, &t->u, &t->v);
     if (!(vshi_dot(face, t->axis) < VSHI_ONE_NORMAL)) {
         return;
     }
-    if (task->up != NULL) {
+    if (truth->up != NULL) {
         t->mirror = face;
     } else {
         t->lean = vshi_dome_lean(face, (vshi_vec[]){t->u, t->v, t->axis});
@@ -167,8 +163,8 @@ static void aim_dome(const tracing *task, vshi_vec face, target *t) {
 }
 
 /* False where the point's value needs no rays: it is then in *value. `face`: of AO; NULL: the normal. */
-static bool place_point(const tracing *task, const double position[3], const float *normal, const float *face,
-                        viewpoint *from, double *value) {
+static bool place_point(const vshi_truth *truth, const double position[3], const float *normal,
+                        const float *face, viewpoint *from, double *value) {
     *from = (viewpoint){.origin = vshi_vec_of(position)};
     if (normal != NULL) {
         from->normal = vshi_unit(vshi_vec_off(normal));
@@ -177,34 +173,34 @@ static bool place_point(const tracing *task, const double position[3], const flo
             return false;
         }
         const vshi_vec up = face != NULL ? vshi_vec_off(face) : from->normal;
-        from->origin = vshi_add(from->origin, vshi_scale(up, task->lift));
+        from->origin = vshi_add(from->origin, vshi_scale(up, truth->lift));
     }
     if (!vshi_finite(from->origin)) {
         *value = NAN;
         return false;
     }
     from->target = (target){.axis = from->normal, .radius = 1.0, .lean = VSHI_WHOLE_DOME};
-    if (task->light == NULL) {
-        aim_dome(task, face != NULL ? vshi_vec_off(face) : from->normal, &from->target);
+    if (truth->light == NULL) {
+        aim_dome(truth, face != NULL ? vshi_vec_off(face) : from->normal, &from->target);
     } else {
-        const vshi_light_side side = aim(&task->place, from->origin, &from->target);
+        const vshi_light_side side = aim(&truth->place, from->origin, &from->target);
         if (side != VSHI_LIGHT_SEEN) {
             *value = side == VSHI_LIGHT_WITHIN ? 1.0 : 0.0;
             return false;
         }
     }
-    const vshi_cone_state state = look(task, from->origin, &from->target);
+    const vshi_cone_state state = look(truth, from->origin, &from->target);
     if (state == VSHI_CONE_COVERED) {
         *value = 0.0;
         return false;
     }
-    from->solids = state == VSHI_CONE_FREE ? NULL : task->solids;
-    from->over = task->light == NULL ? task->up : normal != NULL ? &from->normal : NULL;
+    from->solids = state == VSHI_CONE_FREE ? NULL : truth->solids;
+    from->over = truth->light == NULL ? truth->up : normal != NULL ? &from->normal : NULL;
     return true;
 }
 
 /* How many of the rays to places [count] on the disc meet nothing. */
-static int32_t count_free(const tracing *task, const viewpoint *from, const double (*disc)[2],
+static int32_t count_free(const vshi_truth *truth, const viewpoint *from, const double (*disc)[2],
                           int32_t count) {
     const vshi_vec o = from->origin;
     vshi_segment_ray rays[AT_ONCE];
@@ -214,9 +210,9 @@ static int32_t count_free(const tracing *task, const viewpoint *from, const doub
     for (int32_t i = 0; i < count; ++i) {
         vshi_segment_ray *ray = &rays[waiting];
         *ray = (vshi_segment_ray){{o.x, o.y, o.z}, {0.0, 0.0, 0.0}, 0.0};
-        waiting += direct(task, &from->target, disc[i], from->over, ray);
+        waiting += direct(truth, &from->target, disc[i], from->over, ray);
         if (waiting == AT_ONCE || (i + 1 == count && waiting > 0)) {
-            meet(task, from->solids, rays, waiting, blocked);
+            meet(truth, from->solids, rays, waiting, blocked);
             for (size_t r = 0; r < waiting; ++r) {
                 free += !blocked[r];
             }
@@ -230,11 +226,12 @@ static float trace_point(const tracing *task, size_t point) {
     viewpoint from;
     double value;
     const float *normal = task->normals != NULL ? task->normals + 3 * point : NULL;
-    if (!place_point(task, task->positions + 3 * point, normal, NULL, &from, &value)) {
+    if (!place_point(&task->truth, task->positions + 3 * point, normal, NULL, &from, &value)) {
         return (float)value;
     }
-    const int32_t free = count_free(task, &from, (const double(*)[2])task->disc, task->rays);
-    return (float)((double)free / (double)task->rays);
+    const int32_t rays = task->truth.rays;
+    const int32_t free = count_free(&task->truth, &from, (const double(*)[2])task->disc, rays);
+    return (float)((double)free / (double)rays);
 }
 
 /* Rays that all agree are no reason to end where they don't agree with the value: few rays miss what is
@@ -251,17 +248,10 @@ static int32_t count_twice(const vshi_truth *truth, const double position[3], co
                            double *value) {
     /* the samplers' sequences: no others' */
     static const uint32_t PURPOSE[2] = {0x7e570001u, 0x7e570002u};
-    const tracing task = {.triangles = truth->triangles,
-                          .solids = truth->solids,
-                          .lift = truth->lift,
-                          .light = truth->light,
-                          .distance = truth->distance,
-                          .up = truth->up,
-                          .place = truth->place};
     viewpoint from;
     free[0] = free[1] = 0;
     *even = VSHI_TRUTH_UNEVEN;
-    if (!place_point(&task, position, normal, face, &from, value)) {
+    if (!place_point(truth, position, normal, face, &from, value)) {
         return 0;
     }
     int32_t taken = 0;
@@ -270,7 +260,7 @@ static int32_t count_twice(const vshi_truth *truth, const double position[3], co
         const int32_t left = truth->rays - taken, count = left < VSHI_TRUTH_FIRST ? left : VSHI_TRUTH_FIRST;
         for (int k = 0; k < 2; ++k) {
             vshi_sampler_disc(truth->sampler, texel, PURPOSE[k], taken, count, disc);
-            free[k] += count_free(&task, &from, (const double(*)[2])disc, count);
+            free[k] += count_free(truth, &from, (const double(*)[2])disc, count);
         }
         taken += count;
         const bool alike = (free[0] == 0 || free[0] == taken) && free[0] == free[1];
@@ -324,43 +314,36 @@ static void trace_points(void *user, size_t begin, size_t end) {
     }
 }
 
-static vsh_result trace(tracing *task, size_t count, const vsh_run *run, const char *stage,
-                        vsh_error *error) {
+static vsh_result trace(tracing *task, size_t count, const vsh_run *run, vsh_error *error) {
     vsh_run full;
-    vsh_result result = vshi_run_resolve(run, &full, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    void *disc;
-    result = vshi_allocate(&disc, (size_t)task->rays, sizeof *task->disc, stage, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    task->disc = disc;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    VSHI_TRY(
+        vshi_allocate((void **)&task->disc, (size_t)task->truth.rays, sizeof *task->disc, "trace", error));
     place(task);
-    vshi_job *job = vshi_job_begin(&full, stage, count);
-    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage)
-                         : vshi_parallel_for(job, count, GRAIN, 1, trace_points, task, error);
+    vshi_job *job = vshi_job_begin(&full, "trace", count);
+    const vsh_result result = job == NULL
+                                  ? vshi_fail(error, VSH_ERROR_MEMORY, "trace: the system refused memory")
+                                  : vshi_parallel_for(job, count, GRAIN, 1, trace_points, task, error);
     vshi_job_end(job);
-    free(disc);
+    free(task->disc);
     return result;
 }
 
 static vsh_result check(const tracing *task, size_t count, const char *call, vsh_error *error) {
-    const bool nothing = task->triangles == NULL && task->solids == NULL;
+    const bool nothing = task->truth.triangles == NULL && task->truth.solids == NULL;
     if (nothing || (count > 0 && (task->positions == NULL || task->values == NULL))) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s NULL", call,
                          nothing                   ? "both triangles and solids are"
                          : task->positions == NULL ? "positions is"
                                                    : "the result's array is");
     }
-    if (task->rays < 1 || task->rays > MAX_RAYS) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: rays %d is out of range 1 … %d", call, task->rays,
-                         MAX_RAYS);
+    if (task->truth.rays < 1 || task->truth.rays > MAX_RAYS) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: rays %d is out of range 1 … %d", call,
+                         task->truth.rays, MAX_RAYS);
     }
-    if (!(task->lift >= 0.0 && isfinite(task->lift))) {
+    if (!(task->truth.lift >= 0.0 && isfinite(task->truth.lift))) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: lift %g: expected a finite number, at least 0", call,
-                         task->lift);
+                         task->truth.lift);
     }
     return VSH_OK;
 }
@@ -370,39 +353,33 @@ vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *so
                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
                             vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {.triangles = triangles,
-                    .solids = solids,
-                    .positions = positions,
-                    .normals = normals,
-                    .lift = lift,
-                    .light = light,
-                    .rays = rays,
-                    .values = visibility};
+    tracing task = {
+        .truth = {.triangles = triangles, .solids = solids, .lift = lift, .light = light, .rays = rays},
+        .positions = positions,
+        .normals = normals,
+        .values = visibility};
     VSHI_TRY(check(&task, count, "vsh_trace_shadow", error));
     VSHI_TRY(vsh_light_check(light, error));
-    task.place = vshi_light_in_world(light);
+    task.truth.place = vshi_light_in_world(light);
     /* all rays to a point are one ray */
-    task.rays = vshi_light_is_point(&task.place) ? 1 : rays;
-    return trace(&task, count, run, "trace", error);
+    task.truth.rays = vshi_light_is_point(&task.truth.place) ? 1 : rays;
+    return trace(&task, count, run, error);
 }
 
 vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
                         const double *positions, const float *normals, double lift, double distance,
                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
     VSHI_FLOATS;
-    tracing task = {.triangles = triangles,
-                    .solids = solids,
-                    .positions = positions,
-                    .normals = normals,
-                    .lift = lift,
-                    .distance = distance,
-                    .rays = rays,
-                    .values = ao};
+    tracing task = {
+        .truth = {.triangles = triangles, .solids = solids, .lift = lift, .distance = distance, .rays = rays},
+        .positions = positions,
+        .normals = normals,
+        .values = ao};
     VSHI_TRY(check(&task, count, "vsh_trace_ao", error));
     VSHI_NEEDS_OF(count, normals);
     if (!(distance > 0.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",
                          distance);
     }
-    return trace(&task, count, run, "trace", error);
+    return trace(&task, count, run, error);
 }
