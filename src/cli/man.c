@@ -93,13 +93,7 @@ static void write_see_also(FILE *out, const cli_command *command) {
     }
     fputc('\n', out);
     fputs(".PP\n", out);
-    char pages[1024] = "'vdbshade help TOPIC' prints pages of the manual. Topics:";
-    for (const cli_page *page = cli_pages; page->name != NULL; ++page) {
-        const size_t used = strlen(pages);
-        snprintf(pages + used, sizeof pages - used, " docs/%s.md%s", page->name,
-                 page[1].name != NULL ? "," : ".");
-    }
-    write_paragraph(out, pages);
+    write_paragraph(out, "'vdbshade help' lists the pages of the manual.");
 }
 
 static void write_program(FILE *out) {

@@ -38,7 +38,7 @@ typedef struct trade_receiver {
 
 /* One way to bake, its time and its error. */
 typedef struct trade_run {
-    char method[16];
+    const char *method; /* a static string */
     char options[128];  /* of `bake` */
     int32_t resolution; /* 0: none, or chosen by auto */
     bool front;         /* no other run is both faster and nearer to the truth */
@@ -489,48 +489,40 @@ static int measure_embree(trade_work *work, trade_subject *subject) {
 
 /* --- the methods */
 
-/* Methods of shadows and of AO, each with an option and its value. The quick ones first: the budget leaves
- * out the slow ones. */
-static const char *const plans[2][20] = {
-    {"auto --max-error 0.05",
-     "auto --max-error 0.02",
-     "auto --max-error 0.01",
-     "auto --max-error 0.005",
-     "hard",
-     "classic",
-     "improved",
-     "smooth",
-     "cone",
-     "rays --rays 4",
-     "adaptive --max-error 0.05",
-     "exact --max-error 0.05",
-     "adaptive --max-error 0.02",
-     "exact --max-error 0.02",
-     "adaptive --max-error 0.01",
-     "exact --max-error 0.01",
-     "rays --rays 16",
-     "exact --max-error 0.005",
-     "adaptive --max-error 0.005",
-     "rays --rays 64"},
-    {"auto --max-error 0.05", "auto --max-error 0.02", "auto --max-error 0.01", "auto --max-error 0.005",
-     "taps", "cones", "rays --rays 4", "adaptive --max-error 0.05", "exact --max-error 0.05",
-     "adaptive --max-error 0.02", "exact --max-error 0.02", "rays --rays 16", "adaptive --max-error 0.01",
-     "exact --max-error 0.01", "rays --rays 64", "exact --max-error 0.005", "adaptive --max-error 0.005"}};
-enum { PLANS = sizeof plans[0] / sizeof plans[0][0] };
+/* A method of shadows, of AO or of both, and an option of `bake` with its values. */
+typedef struct trade_plan {
+    const char *method, *option;
+    const char *values[4]; /* NULL after the last; quick ones first: the budget leaves out the slow ones */
+} trade_plan;
+
+static const trade_plan plans[] = {
+    {"auto", "--max-error", {"0.05", "0.02", "0.01", "0.005"}},
+    {"hard", "", {""}},
+    {"classic", "", {""}},
+    {"improved", "", {""}},
+    {"smooth", "", {""}},
+    {"cone", "", {""}},
+    {"taps", "", {""}},
+    {"cones", "", {""}},
+    {"rays", "--rays", {"4", "16", "64"}},
+    {"adaptive", "--max-error", {"0.05", "0.02", "0.01", "0.005"}},
+    {"exact", "--max-error", {"0.05", "0.02", "0.01", "0.005"}},
+};
 
 /* Puts a plan over a scene of its own, and names the run by the options of `bake`. */
-static int apply_plan(const trade_subject *subject, const char *plan, vsh_scene *scene, trade_run *run) {
-    char option[16], value[16];
+static int apply_plan(const trade_subject *subject, const trade_plan *plan, const char *value,
+                      vsh_scene *scene, trade_run *run) {
     const char *method = subject->ao ? "--ao-method" : "--method";
-    const int words = sscanf(plan, "%15s %15s %15s", run->method, option, value);
-    snprintf(run->options, sizeof run->options, "%s %s", method, plan);
+    run->method = plan->method;
+    snprintf(run->options, sizeof run->options, "%s %s%s%s%s%s", method, plan->method,
+             *value != '\0' ? " " : "", plan->option, *value != '\0' ? " " : "", value);
     scene->shade.rays = 0; /* the error decides */
     vsh_error error;
-    CLI_TRY(cli_check(vsh_scene_set(scene, method, run->method, &error), &error));
-    return words < 3 ? CLI_OK : cli_check(vsh_scene_set(scene, option, value, &error), &error);
+    CLI_TRY(cli_check(vsh_scene_set(scene, method, plan->method, &error), &error));
+    return *value == '\0' ? CLI_OK : cli_check(vsh_scene_set(scene, plan->option, value, &error), &error);
 }
 
-/* What `bake` chooses by itself: also the casters. */
+/* Measures auto, which chooses the casters itself. */
 static int measure_auto(trade_work *work, trade_subject *subject, vsh_scene *scene, trade_run *run) {
     scene->ao = subject->ao ? scene->ao : 0;
     scene->light_count = subject->ao ? 0 : scene->light_count;
@@ -542,11 +534,11 @@ static int measure_auto(trade_work *work, trade_subject *subject, vsh_scene *sce
     return code;
 }
 
-static int measure_plan(trade_work *work, trade_subject *subject, const char *plan) {
+static int measure_plan(trade_work *work, trade_subject *subject, const trade_plan *plan, const char *value) {
     for (size_t f = 0; f < work->settings->resolution_count; ++f) {
         trade_run run = {.resolution = 0};
         vsh_scene scene = *work->scene;
-        CLI_TRY(apply_plan(subject, plan, &scene, &run));
+        CLI_TRY(apply_plan(subject, plan, value, &scene, &run));
         const bool exact = strcmp(run.method, "exact") == 0;
         if ((exact && !is_traceable(work)) || exceeds_budget(work)) {
             continue;
@@ -565,10 +557,15 @@ static int measure_plan(trade_work *work, trade_subject *subject, const char *pl
 }
 
 static int measure_plans(trade_work *work) {
-    for (int i = 0; i < PLANS; ++i) {
-        for (size_t s = 0; s < work->subject_count; ++s) {
-            const char *plan = plans[work->subjects[s].ao][i];
-            CLI_TRY(plan != NULL ? measure_plan(work, &work->subjects[s], plan) : CLI_OK);
+    const size_t methods = sizeof plans / sizeof plans[0];
+    for (size_t i = 0; i < 4 * methods; ++i) {
+        const trade_plan *plan = &plans[i % methods];
+        const char *value = plan->values[i / methods];
+        for (size_t s = 0; s < work->subject_count && value != NULL; ++s) {
+            trade_subject *subject = &work->subjects[s];
+            const bool has_method =
+                vsh_find_name(subject->ao ? VSH_NAMES_AO : VSH_NAMES_SHADOW, plan->method) >= 0;
+            CLI_TRY(has_method ? measure_plan(work, subject, plan, value) : CLI_OK);
         }
     }
     return CLI_OK;
