@@ -125,17 +125,21 @@ static void list_topics(void) {
     }
 }
 
-static int unknown_topic(const char *topic) {
+const char *cli_nearest_topic(const char *text, bool has_pages) {
     enum { MOST = 128 };
     const char *names[MOST];
     size_t count = 0;
     for (const cli_command_row *row = cli_commands; row->command != NULL; ++row) {
         names[count++] = row->command->name;
     }
-    for (const cli_page *page = cli_pages; count < MOST && page->name != NULL; ++page) {
+    for (const cli_page *page = cli_pages; has_pages && count < MOST && page->name != NULL; ++page) {
         names[count++] = page->name;
     }
-    const char *near = cli_nearest(topic, names, count);
+    return cli_nearest(text, names, count);
+}
+
+static int unknown_topic(const char *topic) {
+    const char *near = cli_nearest_topic(topic, true);
     if (near != NULL) {
         return cli_usage("help: %s: no such topic; did you mean %s?", topic, near);
     }

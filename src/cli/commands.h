@@ -33,6 +33,10 @@ extern const cli_command_row cli_commands[]; /* in the order of the help; the la
 /* Returns the row of a command's name, or NULL. */
 const cli_command_row *cli_find_command(const char *name);
 
+/* Returns the command, or also the page of the manual, whose name is nearest to `text`; NULL if none is near.
+ */
+const char *cli_nearest_topic(const char *text, bool has_pages);
+
 typedef struct cli_exit_row {
     int code;
     const char *meaning;

@@ -17,13 +17,7 @@ static int unknown_command(const char *text) {
     if (text[0] == '-') {
         return cli_usage("%s: no such option; see 'vdbshade --help'", text);
     }
-    enum { MOST = 64 };
-    const char *names[MOST];
-    size_t count = 0;
-    for (; cli_commands[count].command != NULL; ++count) {
-        names[count] = cli_commands[count].command->name;
-    }
-    const char *near = cli_nearest(text, names, count);
+    const char *near = cli_nearest_topic(text, false);
     if (near != NULL) {
         return cli_usage("%s: no such command; did you mean %s?", text, near);
     }

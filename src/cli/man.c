@@ -1,6 +1,5 @@
-/* Man pages in the man macros (man(7)), one of the program and one of each command. Characters beyond ASCII
- * become \[u2026], so that a page reads the same in every encoding. There is no date: the same build gives
- * the same page. */
+/* Man pages in the man macros (man(7)), one of the program and one of each command. There is no date: the
+ * same build gives the same page. */
 #include "commands.h"
 #include "message.h"
 
@@ -10,36 +9,16 @@
 
 enum { WIDTH = 56 }; /* and what escapes add to it: lines stay below 80 bytes */
 
-/* One character's code point, of valid UTF-8, which texts of ours are. */
-static unsigned code_point(const unsigned char *c, int *length) {
-    *length = c[0] < 0x80 ? 1 : c[0] < 0xe0 ? 2 : c[0] < 0xf0 ? 3 : 4;
-    unsigned point = *length == 1 ? c[0] : c[0] & (0x3fu >> (*length - 1));
-    for (int i = 1; i < *length; ++i) {
-        point = point << 6 | (c[i] & 0x3fu);
-    }
-    return point;
-}
-
-/* A word as roff takes it literally. Dashes of options are minus signs, which can be copied. */
+/* Writes a word as roff takes it literally. Dashes are minus signs, which can be copied. */
 static void put_word(FILE *out, const char *word, int length, int first) {
     if (first && (word[0] == '.' || word[0] == '\'')) {
         fputs("\\&", out);
     }
-    const bool copied = word[0] == '-' || memchr(word, '.', (size_t)length) != NULL ||
-                        (length > 2 && strncmp(word + 1, "--", 2) == 0); /* options and files */
-    if (copied) {
-        fputs("\\%", out); /* in one piece */
-    }
-    for (int i = 0, bytes; i < length; i += bytes) {
-        const unsigned point = code_point((const unsigned char *)word + i, &bytes);
-        if (point >= 0x80) {
-            fprintf(out, "\\[u%04X]", point);
-        } else if (point == '\\') {
-            fputs("\\e", out);
-        } else if (point == '-' && copied) {
-            fputs("\\-", out);
+    for (int i = 0; i < length; ++i) {
+        if (word[i] == '\\' || word[i] == '-') {
+            fputs(word[i] == '-' ? "\\-" : "\\e", out);
         } else {
-            fputc((int)point, out);
+            fputc(word[i], out);
         }
     }
 }
@@ -114,13 +93,7 @@ static void write_see_also(FILE *out, const cli_command *command) {
     }
     fputc('\n', out);
     fputs(".PP\n", out);
-    char pages[1024] = "'vdbshade help TOPIC' prints pages of the manual. Topics:";
-    for (const cli_page *page = cli_pages; page->name != NULL; ++page) {
-        const size_t used = strlen(pages);
-        snprintf(pages + used, sizeof pages - used, " docs/%s.md%s", page->name,
-                 page[1].name != NULL ? "," : ".");
-    }
-    write_paragraph(out, pages);
+    write_paragraph(out, "'vdbshade help' lists the pages of the manual.");
 }
 
 static void write_program(FILE *out) {

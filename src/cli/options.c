@@ -7,7 +7,6 @@
 #include "progress.h"
 #include "warnings.h"
 
-#include <getopt.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -85,11 +84,14 @@ size_t cli_list_options(const cli_command *command, cli_option *options, size_t 
     return count;
 }
 
-bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option) {
+bool cli_find_option(const cli_command *command, const char *word, cli_option *option) {
     cli_option list[CLI_MOST_OPTIONS];
     const size_t count = cli_list_options(command, list, CLI_MOST_OPTIONS);
+    const size_t length = word[1] == '-' ? strcspn(word + 2, "=") : 0;
     for (size_t i = 0; i < count; ++i) {
-        if (list[i].key != 0 && strlen(list[i].name) == length && strncmp(list[i].name, name, length) == 0) {
+        const bool named = length > 0 && list[i].key != 0 && strlen(list[i].name) == length &&
+                           strncmp(list[i].name, word + 2, length) == 0;
+        if (named || (length == 0 && list[i].key == word[1])) {
             *option = list[i];
             return true;
         }
@@ -113,22 +115,26 @@ const char *cli_nearest(const char *text, const char *const *candidates, size_t 
     return nearest;
 }
 
+enum { MOST_OPERANDS = 2 };
+
 /* A command line that is being parsed. */
 typedef struct parsing {
     const cli_command *command;
-    cli_option options[CLI_MOST_OPTIONS];
-    size_t count;
     int argc;
     char **argv;
+    const char *operands[MOST_OPERANDS + 1]; /* the first ones */
+    int operand_count;
     FILE *told; /* the command line as outputs tell it */
 } parsing;
 
 static int unknown_option(const parsing *p, const char *text) {
+    cli_option list[CLI_MOST_OPTIONS];
+    const size_t rows = cli_list_options(p->command, list, CLI_MOST_OPTIONS);
     const char *names[CLI_MOST_OPTIONS];
     size_t count = 0;
-    for (size_t i = 0; i < p->count; ++i) {
-        if (p->options[i].key != 0) {
-            names[count++] = p->options[i].name;
+    for (size_t i = 0; i < rows; ++i) {
+        if (list[i].key != 0) {
+            names[count++] = list[i].name;
         }
     }
     char word[64];
@@ -139,49 +145,6 @@ static int unknown_option(const parsing *p, const char *text) {
         return cli_usage("%s: no such option; did you mean --%s?", text, near);
     }
     return cli_usage("%s: no such option; see 'vdbshade %s --help'", text, p->command->name);
-}
-
-static const cli_option *option_of_key(const parsing *p, int key) {
-    for (size_t i = 0; i < p->count; ++i) {
-        if (p->options[i].key == key) {
-            return &p->options[i];
-        }
-    }
-    return NULL;
-}
-
-static void make_getopt_tables(const parsing *p, struct option *longs, char *shorts) {
-    *shorts++ = ':'; /* a missing value is told from an unknown option */
-    for (size_t i = 0; i < p->count; ++i) {
-        const cli_option *option = &p->options[i];
-        if (option->key == 0) {
-            continue;
-        }
-        *longs++ = (struct option){option->name, option->value != NULL ? required_argument : no_argument,
-                                   NULL, option->key};
-        if (option->key < 256) {
-            *shorts++ = (char)option->key;
-            if (option->value != NULL) {
-                *shorts++ = ':';
-            }
-        }
-    }
-    *shorts = '\0';
-    *longs = (struct option){NULL, 0, NULL, 0};
-}
-
-/* getopt_long() takes any beginning of a name; a script that relies on one would break at the next option.
- * The word it took is the last or, where the value stands by itself, the last but one. */
-static bool abbreviated(const cli_option *option, char **argv, const char *value, const char **word) {
-    *word = argv[optind - 1];
-    if (value != NULL && value == argv[optind - 1]) {
-        *word = argv[optind - 2];
-    }
-    if (strncmp(*word, "--", 2) != 0) {
-        return false; /* a short option */
-    }
-    const size_t length = strcspn(*word + 2, "=");
-    return length != strlen(option->name) || strncmp(*word + 2, option->name, length) != 0;
 }
 
 /* --- the command line as outputs tell it */
@@ -260,8 +223,8 @@ vsh_run cli_make_run(void) {
     vsh_run run = vsh_run_default();
     run.threads = cli_given.threads;
     run.memory_limit = cli_given.memory_limit;
-    run.reader = cli_given.sandbox == CLI_SANDBOX_OFF ? NULL : VSH_READER;
-    run.confined = cli_given.sandbox == CLI_SANDBOX_REQUIRE;
+    run.reader = strcmp(cli_given.sandbox, "off") == 0 ? NULL : VSH_READER;
+    run.confined = strcmp(cli_given.sandbox, "require") == 0;
     run.allow_outside = cli_given.allow_outside;
     run.progress = cli_progress_report;
     run.warning = cli_warnings_parse;
@@ -271,15 +234,11 @@ vsh_run cli_make_run(void) {
 }
 
 static int parse_sandbox(const char *name, const char *value) {
-    static const char *const names[] = {
-        [CLI_SANDBOX_AUTO] = "auto", [CLI_SANDBOX_REQUIRE] = "require", [CLI_SANDBOX_OFF] = "off"};
-    for (int i = CLI_SANDBOX_AUTO; i <= CLI_SANDBOX_OFF; ++i) {
-        if (strcmp(value, names[i]) == 0) {
-            cli_given.sandbox = i;
-            return CLI_OK;
-        }
+    if (strcmp(value, "auto") != 0 && strcmp(value, "require") != 0 && strcmp(value, "off") != 0) {
+        return cli_usage("%s '%s': expected auto, require or off", name, value);
     }
-    return cli_usage("%s '%s': expected auto, require or off", name, value);
+    cli_given.sandbox = value;
+    return CLI_OK;
 }
 
 /* Stores the value of an option whose key is a place in the settings. */
@@ -336,40 +295,62 @@ static int parse_option(cli_option_fn *take, void *settings, int key, const char
     }
 }
 
-/* Parses all options; optind is then the first operand's place. */
-static int parse_options(const parsing *p, cli_option_fn *take, void *settings) {
-    struct option longs[CLI_MOST_OPTIONS + 1];
-    char shorts[2 * CLI_MOST_OPTIONS + 2];
-    make_getopt_tables(p, longs, shorts);
-    opterr = 0;
-    optind = 1;
-    int key;
-    while ((key = getopt_long(p->argc, p->argv, shorts, longs, NULL)) != -1) {
-        if (key == ':') {
-            return cli_usage("%s: needs a value", p->argv[optind - 1]);
+/* Parses an option with the value that its word gives, or (NULL) that the next word is, and moves *at there.
+ */
+static int parse_value(const parsing *p, cli_option_fn *take, void *settings, const cli_option *option,
+                       const char *value, int *at) {
+    char name[64];
+    snprintf(name, sizeof name, "--%s", option->name);
+    if (value != NULL && option->value == NULL) {
+        return cli_usage("%s: takes no value", name);
+    }
+    if (value == NULL && option->value != NULL) {
+        if (*at + 1 == p->argc) {
+            return cli_usage("%s: needs a value", name);
         }
-        if (key == '?') {
-            const cli_option *known = optopt != 0 ? option_of_key(p, optopt) : NULL;
-            if (known != NULL && known->value == NULL) {
-                return cli_usage("--%s: takes no value", known->name);
+        value = p->argv[++*at];
+    }
+    if (option->key == 'h') {
+        cli_print_help(p->command);
+        return CLI_HELP;
+    }
+    tell_option(p->told, option, value);
+    const int place = option->key == 'o' ? find_output(p->command) : option->key;
+    return parse_option(take, settings, place, name, value);
+}
+
+/* Parses "-q", "-o", "-oVALUE" or "-qo". */
+static int parse_letters(const parsing *p, cli_option_fn *take, void *settings, int *at) {
+    cli_option option = {.value = NULL};
+    for (const char *c = p->argv[*at] + 1; *c != '\0' && option.value == NULL; ++c) {
+        const char letter[] = {'-', *c, '\0'};
+        if (!cli_find_option(p->command, letter, &option)) {
+            return unknown_option(p, letter);
+        }
+        const char *value = option.value != NULL && c[1] != '\0' ? c + 1 : NULL;
+        CLI_TRY(parse_value(p, take, settings, &option, value, at));
+    }
+    return CLI_OK;
+}
+
+/* Parses all options, and lists the operands between them and after "--". */
+static int parse_options(parsing *p, cli_option_fn *take, void *settings) {
+    bool ended = false;
+    for (int at = 1; at < p->argc; ++at) {
+        const char *word = p->argv[at], *sign = strchr(word, '=');
+        cli_option option;
+        if (!ended && strcmp(word, "--") == 0) {
+            ended = true;
+        } else if (!ended && strncmp(word, "--", 2) == 0) {
+            if (!cli_find_option(p->command, word, &option)) {
+                return unknown_option(p, word);
             }
-            const char letter[3] = {'-', (char)optopt, '\0'};
-            return unknown_option(p, optopt > 0 && optopt < 256 ? letter : p->argv[optind - 1]);
+            CLI_TRY(parse_value(p, take, settings, &option, sign != NULL ? sign + 1 : NULL, &at));
+        } else if (!ended && word[0] == '-' && word[1] != '\0') {
+            CLI_TRY(parse_letters(p, take, settings, &at));
+        } else if (p->operand_count <= MOST_OPERANDS) {
+            p->operands[p->operand_count++] = word;
         }
-        if (key == 'h') {
-            cli_print_help(p->command);
-            return CLI_HELP;
-        }
-        const cli_option *option = option_of_key(p, key);
-        const char *word;
-        if (abbreviated(option, p->argv, optarg, &word)) {
-            return unknown_option(p, word);
-        }
-        char name[64];
-        snprintf(name, sizeof name, "--%s", option->name);
-        tell_option(p->told, option, optarg);
-        const int place = key == 'o' ? find_output(p->command) : key;
-        CLI_TRY(parse_option(take, settings, place, key < 256 ? word : name, optarg));
     }
     return CLI_OK;
 }
@@ -384,7 +365,7 @@ static int parse_operands(const parsing *p, const char **operands) {
         const size_t length = strcspn(at, " ");
         optional = *at == '[';
         snprintf(name, sizeof name, "%.*s", (int)length - 2 * optional, at + optional);
-        operands[count] = optind < p->argc ? p->argv[optind++] : NULL;
+        operands[count] = count < p->operand_count ? p->operands[count] : NULL;
         if (operands[count] != NULL) {
             tell_word(p->told, cli_file_name(operands[count]));
         } else if (!optional) {
@@ -392,8 +373,8 @@ static int parse_operands(const parsing *p, const char **operands) {
         }
         at += length + strspn(at + length, " ");
     }
-    if (optind < p->argc) {
-        return cli_usage("%s: one %s is taken, not also '%s'", command, name, p->argv[optind]);
+    if (count < p->operand_count) {
+        return cli_usage("%s: one %s is taken, not also '%s'", command, name, p->operands[count]);
     }
     parsed_grid = count == 1 && !optional ? cli_split_grid(&operands[0]) : NULL;
     cli_message_input(operands[0]);
@@ -403,8 +384,7 @@ static int parse_operands(const parsing *p, const char **operands) {
 int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
               const char **operands) {
     parsing p = {.command = command, .argc = argc, .argv = argv};
-    p.count = cli_list_options(command, p.options, CLI_MOST_OPTIONS);
-    cli_given = (cli_common){.memory_limit = machine_memory() / 4 * 3, .sandbox = CLI_SANDBOX_AUTO};
+    cli_given = (cli_common){.memory_limit = machine_memory() / 4 * 3, .sandbox = "auto"};
     free(parsed_command);
     parsed_command = NULL;
     size_t size;

@@ -52,8 +52,8 @@ enum {
 /* Setting `index` of the library; NULL beyond the last. */
 const vsh_setting *cli_setting(size_t index);
 
-/* The option of that name, of `length` bytes; false: the command has none. */
-bool cli_find_option(const cli_command *command, const char *name, size_t length, cli_option *option);
+/* The option of a word "--NAME", "--NAME=VALUE" or "-o"; false: the command has none. */
+bool cli_find_option(const cli_command *command, const char *word, cli_option *option);
 
 /* Its options and headings with the library's settings in the place of their rows, which last as long as the
  * process; at most `most` of them. Returns how many. */
@@ -106,11 +106,9 @@ typedef struct cli_common {
     bool quiet;
     bool verbose; /* print each warning and notes */
     bool progress;
-    int sandbox;        /* CLI_SANDBOX_…: how the process is confined that parses files */
-    bool allow_outside; /* what models name may lie outside their folder */
+    const char *sandbox; /* "auto", "require" or "off": how the process is confined that parses files */
+    bool allow_outside;  /* models may name files outside their folder */
 } cli_common;
-
-enum { CLI_SANDBOX_AUTO, CLI_SANDBOX_REQUIRE, CLI_SANDBOX_OFF };
 
 /* As the last command line gave them. */
 extern cli_common cli_given;

@@ -1,6 +1,7 @@
 #include "patch.h"
 
 #include "message.h"
+#include "paths.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -45,17 +46,12 @@ static int take_rule(cli_patch *patch, const char *name, const char *value) {
         int32_t solidity;
     } kinds[] = {{"solid", VSH_SOLIDITY_SOLID}, {"sheet", VSH_SOLIDITY_SHELL}, {"room", VSH_SOLIDITY_INWARD}};
     const char *kind = strrchr(value, '=');
-    const size_t length = kind != NULL ? (size_t)(kind - value) : 0, used = patch->pattern_bytes;
-    if (patch->rule_count == CLI_MOST_RULES || length >= CLI_MOST_PATTERNS - used) {
-        return cli_usage("%s %s: more than %d patterns, or %d bytes of them", name, value, CLI_MOST_RULES,
-                         CLI_MOST_PATTERNS);
+    if (patch->rule_count == CLI_MOST_RULES) {
+        return cli_usage("%s %s: more than %d patterns", name, value, CLI_MOST_RULES);
     }
-    for (size_t i = 0; length > 0 && i < sizeof kinds / sizeof kinds[0]; ++i) {
+    for (size_t i = 0; kind > value && i < sizeof kinds / sizeof kinds[0]; ++i) {
         if (strcmp(kind + 1, kinds[i].name) == 0) {
-            char *pattern = patch->patterns + used;
-            memcpy(pattern, value, length);
-            pattern[length] = '\0';
-            patch->pattern_bytes += length + 1;
+            const char *pattern = cli_keep_text("%.*s", (int)(kind - value), value);
             patch->rules[patch->rule_count++] = (vsh_solidity_rule){pattern, kinds[i].solidity};
             return CLI_OK;
         }

@@ -5,14 +5,12 @@
 
 #include "options.h"
 
-enum { CLI_MOST_RULES = 64, CLI_MOST_PATTERNS = 4096 /* bytes of all */ };
+enum { CLI_MOST_RULES = 64 };
 
 typedef struct cli_patch {
     const char *text[CLI_MOST_SETTINGS]; /* the value of each setting; NULL: not given */
     vsh_solidity_rule rules[CLI_MOST_RULES];
     size_t rule_count;
-    char patterns[CLI_MOST_PATTERNS]; /* the rules', one after the other */
-    size_t pattern_bytes;
 } cli_patch;
 
 /* Parses an option of a group of settings, or --treat. */

@@ -17,29 +17,23 @@ static const double log_interval = 2.0;
 static const double estimate_fraction = 0.02;
 static const double estimate_seconds = 0.5;
 
-/* The clock goes on when a stage is interrupted by short ones: the next lightmap's tiles go on with "bake".
- */
-enum { STAGES = 16, NAME = 32 };
-typedef struct stage_clock {
-    char name[NAME];
-    double began, fraction;
-} stage_clock;
+enum { NAME = 32 };
 
 static struct {
     pthread_mutex_t lock; /* around everything here and around standard error */
     bool shown;
     bool terminal;
-    bool standing; /* a line without its newline is on the terminal */
-    stage_clock stages[STAGES];
-    stage_clock *stage; /* the last one reported */
-    double last;        /* when something was written */
+    bool standing;    /* a line without its newline is on the terminal */
+    char stage[NAME]; /* the last one reported */
+    double began;     /* when it began, seconds */
+    double skipped;   /* its fraction then */
+    double last;      /* when something was written */
 } state = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 void cli_progress_begin(bool wanted, bool quiet) {
     state.terminal = isatty(STDERR_FILENO) != 0;
     state.shown = !quiet && (wanted || state.terminal);
-    memset(state.stages, 0, sizeof state.stages);
-    state.stage = NULL;
+    state.stage[0] = '\0';
 }
 
 static void clear_line(void) {
@@ -49,32 +43,16 @@ static void clear_line(void) {
     }
 }
 
-/* Finds the clock of a stage, which starts again if the fraction falls. */
-static stage_clock *find_stage(const char *name, double fraction, double now) {
-    int i = 0;
-    while (i < STAGES - 1 && state.stages[i].name[0] != '\0' &&
-           strncmp(state.stages[i].name, name, NAME - 1) != 0) {
-        ++i;
-    }
-    stage_clock *stage = &state.stages[i];
-    if (strncmp(stage->name, name, NAME - 1) != 0 || fraction < stage->fraction) {
-        snprintf(stage->name, NAME, "%s", name);
-        stage->began = now;
-    }
-    stage->fraction = fraction;
-    return stage;
-}
-
-static void show(const stage_clock *stage, double now) {
+static void show(double fraction, double now) {
     char rest[32] = "";
-    const double elapsed = now - stage->began;
-    if (elapsed >= estimate_seconds && stage->fraction >= estimate_fraction && stage->fraction < 1.0) {
-        const double left = elapsed * (1.0 - stage->fraction) / stage->fraction;
+    const double elapsed = now - state.began, done = fraction - state.skipped;
+    if (elapsed >= estimate_seconds && done >= estimate_fraction && fraction < 1.0) {
+        const double left = elapsed * (1.0 - fraction) / done;
         snprintf(rest, sizeof rest, ", about %.0f %s left", left >= 100.0 ? left / 60.0 : left,
                  left >= 100.0 ? "min" : "s");
     }
     clear_line();
-    fprintf(stderr, "vdbshade: %s %.0f %%%s", stage->name, 100.0 * stage->fraction, rest);
+    fprintf(stderr, "vdbshade: %s %.0f %%%s", state.stage, 100.0 * fraction, rest);
     if (state.terminal) {
         state.standing = true;
         fflush(stderr);
@@ -89,11 +67,15 @@ int32_t cli_progress_report(void *user, const char *name, double fraction) {
     if (state.shown) {
         pthread_mutex_lock(&state.lock);
         const double now = vshi_seconds();
-        const stage_clock *before = state.stage;
-        state.stage = find_stage(name, fraction, now);
+        const bool is_new = strncmp(state.stage, name, NAME - 1) != 0;
+        if (is_new) {
+            snprintf(state.stage, NAME, "%s", name);
+            state.began = now;
+            state.skipped = fraction;
+        }
         if (now - state.last >= (state.terminal ? terminal_interval : log_interval) ||
-            (state.stage != before && !state.terminal)) {
-            show(state.stage, now);
+            (is_new && !state.terminal)) {
+            show(fraction, now);
         }
         pthread_mutex_unlock(&state.lock);
     }

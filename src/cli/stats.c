@@ -297,28 +297,19 @@ static void say_errors(const cli_stats *stats) {
     free(text);
 }
 
-/* "shadow exact, AO exact, max error 0.02; no voxels, 11.3 rays a value, those of AO shared by texels". */
+/* "shadow exact, AO exact, max error 0.02; 11.3 rays a value". */
 static void say_choice(const cli_stats *stats) {
-    char methods[128], voxels[64] = "no voxels", rays[48] = "", spacing[48] = "";
-    if (*cli_stats_methods_text(stats, methods, sizeof methods) == '\0') {
-        return;
-    }
-    if (stats->casters.field_bytes > 0) {
-        snprintf(voxels, sizeof voxels, "voxels of %.4g", stats->casters.voxel_size);
-    }
+    char methods[128], rays[48] = "";
     double values = 0.0;
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         values += sum_errors(stats, kind).values;
     }
     if (values > 0.0) {
-        snprintf(rays, sizeof rays, ", %.3g rays a value", (double)stats->shade.rays / values);
+        snprintf(rays, sizeof rays, "; %.3g rays a value", (double)stats->shade.rays / values);
     }
-    const cli_method *ao = &stats->methods[CLI_STATS_AO];
-    if (ao->name != NULL && stats->ao_spacing > 1) {
-        snprintf(spacing, sizeof spacing,
-                 ao->traces ? ", those of AO shared by texels" : ", AO every %d texels", stats->ao_spacing);
+    if (*cli_stats_methods_text(stats, methods, sizeof methods) != '\0') {
+        cli_say("%s%s", methods, rays);
     }
-    cli_say("%s; %s%s%s", methods, voxels, rays, spacing);
 }
 
 void cli_stats_say(const cli_stats *stats) {

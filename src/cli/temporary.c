@@ -88,29 +88,19 @@ json_t *cli_utf8_json(const char *text) {
 }
 
 void cli_escape(FILE *out, const char *text) {
+    static const char specials[] = "<>&\"";
+    static const char *const escapes[] = {"&lt;", "&gt;", "&amp;", "&quot;"};
     for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
         length = vshi_utf8_length(text);
-        switch (*text) {
-        case '<':
-            fputs("&lt;", out);
-            break;
-        case '>':
-            fputs("&gt;", out);
-            break;
-        case '&':
-            fputs("&amp;", out);
-            break;
-        case '"':
-            fputs("&quot;", out);
-            break;
-        default: /* control characters are none of XML's */
-            if (length == 0) {
-                fputs(VSHI_NO_CHARACTER, out);
-            } else if (length == 1 && ((unsigned char)*text < 0x20 || *text == 0x7f)) {
-                fputc('?', out);
-            } else {
-                fwrite(text, 1, length, out);
-            }
+        const char *special = strchr(specials, *text);
+        if (special != NULL) {
+            fputs(escapes[special - specials], out);
+        } else if (length == 0) {
+            fputs(VSHI_NO_CHARACTER, out);
+        } else if (length == 1 && ((unsigned char)*text < 0x20 || *text == 0x7f)) {
+            fputc('?', out); /* XML has no control characters */
+        } else {
+            fwrite(text, 1, length, out);
         }
     }
 }

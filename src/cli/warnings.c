@@ -14,24 +14,15 @@
 #include <string.h>
 
 enum {
-    WORST = 3,   /* examples that the line of a kind names */
-    KINDS = 64,  /* warnings of further kinds are printed at once */
-    TEXT = 1024, /* bytes of a warning */
-    NAME = 100   /* bytes of an example's name */
+    KINDS = 64, /* warnings of further kinds are printed at once */
+    TEXT = 1024 /* bytes of a warning */
 };
-
-typedef struct example {
-    char name[NAME]; /* a mesh or file; "" if the warning names none */
-    double number;   /* the first that it gives: the larger, the worse */
-    bool numbered;
-} example;
 
 typedef struct kind {
     char shape[TEXT]; /* the words, without what differs */
     char text[TEXT];  /* of the worst */
+    double number;    /* the first that it gives: the larger, the worse */
     size_t count;
-    bool objects;         /* all are about meshes */
-    example worst[WORST]; /* of two with the same number the earlier goes first */
 } kind;
 
 static struct {
@@ -60,88 +51,62 @@ static const char *behind_file(const char *message) {
     return file ? colon + 2 : message;
 }
 
-/* Keeps the first quoted name as the example's. Returns the end of the quotation at `c`. */
-static const char *take_name(const char *message, const char *c, example *about, bool *object) {
-    const char *end = c + 1;
-    while (*end != '\0' && !closes(end)) {
-        ++end;
-    }
-    if (*end == '\0') {
-        return c;
-    }
-    if (about->name[0] == '\0') {
-        snprintf(about->name, sizeof about->name, "%.*s", (int)(end - c - 1), c + 1);
-        *object = c - message >= 5 && strncmp(c - 5, "mesh ", 5) == 0;
-        *object = *object || (c - message >= 7 && strncmp(c - 7, "object ", 7) == 0);
-    }
-    return end;
-}
-
-/* The words of a warning: names become '', numbers #, and the s that a plural ends in goes. A number in
- * brackets ("mesh 'sail' (3 of 9)") is none that tells how bad it is. */
-static void examine(const char *message, char shape[TEXT], example *about, bool *object) {
+/* The words of a warning: names become '', numbers #, and the s that a plural ends in goes. Returns the first
+ * number, or 0. A number in brackets ("mesh 'sail' (3 of 9)") does not tell how bad the warning is. */
+static double examine(const char *message, char shape[TEXT]) {
     size_t length = 0;
+    double number = 0.0;
     bool found = false, brackets = false;
-    *object = false;
     const char *c = behind_file(message);
-    const char *const first = c;
-    while (*c != '\0' && length + 2 < TEXT) {
-        const char before = c > first ? c[-1] : ' ';
-        if (*c == '\'' && !isalnum((unsigned char)before)) {
-            c = take_name(message, c, about, object);
-            shape[length++] = '\'';
-            c += *c == '\'';
-        } else if (isdigit((unsigned char)*c)) {
+    for (char before = ' '; *c != '\0' && length + 1 < TEXT; before = c[-1]) {
+        char kept = *c++;
+        if (kept == '\'' && !isalnum((unsigned char)before)) {
+            const char *end = c;
+            while (*end != '\0' && !closes(end)) {
+                ++end;
+            }
+            c = *end != '\0' ? end + 1 : c;
+        } else if (isdigit((unsigned char)kept)) {
             char *end;
-            const double value = strtod(c, &end);
-            about->number = found || brackets ? about->number : value;
+            const double value = strtod(c - 1, &end);
+            number = found || brackets ? number : value;
             found = found || !brackets;
-            shape[length++] = '#';
+            kept = '#';
             c = end;
-        } else if (*c == 's' && isalpha((unsigned char)before) && !isalpha((unsigned char)c[1])) {
-            ++c;
+        } else if (kept == 's' && isalpha((unsigned char)before) && !isalpha((unsigned char)*c)) {
+            continue;
         } else {
-            brackets = *c == '(' || (brackets && *c != ')');
-            shape[length++] = *c++;
+            brackets = kept == '(' || (brackets && kept != ')');
         }
+        shape[length++] = kept;
     }
     shape[length] = '\0';
-    about->numbered = found;
-    if (about->name[0] == '\0' && first > message) {
-        snprintf(about->name, sizeof about->name, "%.*s", (int)(first - message - 2), message);
-    }
+    return number;
 }
 
-/* Finds the kind of a shape, or adds it; NULL if there are too many. */
-static kind *find_kind(const char *shape) {
-    for (size_t i = 0; i < state.count; ++i) {
-        if (strcmp(state.kinds[i].shape, shape) == 0) {
-            return &state.kinds[i];
-        }
+/* Counts a warning in its kind; false if there are too many kinds. */
+static bool keep(const char *message) {
+    char shape[TEXT];
+    const double number = examine(message, shape);
+    size_t i = 0;
+    while (i < state.count && strcmp(state.kinds[i].shape, shape) != 0) {
+        ++i;
     }
-    if (state.count == KINDS) {
-        return NULL;
+    if (i == KINDS) {
+        return false;
     }
-    kind *fresh = &state.kinds[state.count++];
-    *fresh = (kind){.objects = true};
-    snprintf(fresh->shape, sizeof fresh->shape, "%s", shape);
-    return fresh;
-}
-
-static void keep(kind *of, const char *message, const example *about) {
-    size_t at = of->count < WORST ? of->count : WORST;
-    for (; at > 0 && about->number > of->worst[at - 1].number; --at) {
-        if (at < WORST) {
-            of->worst[at] = of->worst[at - 1];
-        }
+    kind *of = &state.kinds[i];
+    if (i == state.count) {
+        *of = (kind){.number = -1.0};
+        memcpy(of->shape, shape, sizeof shape);
+        ++state.count;
     }
-    if (at < WORST) {
-        of->worst[at] = *about;
-    }
-    if (at == 0) {
+    if (number > of->number) {
+        of->number = number;
         snprintf(of->text, sizeof of->text, "%s", message);
     }
     ++of->count;
+    return true;
 }
 
 void cli_warnings_parse(void *user, const char *message) {
@@ -150,51 +115,21 @@ void cli_warnings_parse(void *user, const char *message) {
         return;
     }
     pthread_mutex_lock(&state.lock);
-    kind *of = NULL;
-    if (state.keep) {
-        example about = {.numbered = false};
-        char shape[TEXT];
-        bool object;
-        examine(message, shape, &about, &object);
-        of = find_kind(shape);
-        if (of != NULL) {
-            of->objects = of->objects && object;
-            keep(of, message, &about);
-        }
-    }
+    const bool kept = state.keep && keep(message);
     pthread_mutex_unlock(&state.lock);
-    if (of == NULL) { /* notes name themselves */
+    if (!kept) { /* notes name themselves */
         cli_say("%s%s", strncmp(message, "note: ", 6) == 0 ? "" : "warning: ", message);
     }
 }
 
-/* "7 objects, the worst: <its text>; then 'b' (12), 'c' (3); --verbose lists all". */
-static void say_kind(const kind *of) {
-    if (of->count == 1) {
-        cli_say("warning: %s", of->text);
-        return;
-    }
-    char *then;
-    size_t size;
-    FILE *out = open_memstream(&then, &size);
-    for (size_t i = 1; i < WORST && i < of->count; ++i) {
-        const example *one = &of->worst[i];
-        if (one->name[0] != '\0') {
-            fprintf(out, "%s'%s'", ftell(out) > 0 ? ", " : "; then ", one->name);
-            if (one->numbered) {
-                fprintf(out, " (%g)", one->number);
-            }
-        }
-    }
-    fclose(out);
-    cli_say("warning: %zu %s: %s%s; --verbose lists all", of->count, of->objects ? "objects" : "times",
-            of->text, then);
-    free(then);
-}
-
 void cli_warnings_tell(void) {
     for (size_t i = 0; i < state.count; ++i) {
-        say_kind(&state.kinds[i]);
+        const kind *of = &state.kinds[i];
+        if (of->count == 1) {
+            cli_say("warning: %s", of->text);
+        } else {
+            cli_say("warning: %zu times, the worst: %s; --verbose lists all", of->count, of->text);
+        }
     }
     state.count = 0;
 }

@@ -10,7 +10,6 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <getopt.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -147,9 +146,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         words[i] = text[i];
     }
     words[count] = NULL;
-    optind = 0; /* getopt's place within a word of the last run */
-    char *none[] = {text[0], NULL};
-    getopt(1, none, "");
     fuzz_run();
     const int code = vdbshade_main(count, words);
     if (code != CLI_OK && code != CLI_USAGE && code != CLI_FILE && code != CLI_LIMIT &&

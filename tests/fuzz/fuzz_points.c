@@ -14,11 +14,12 @@ enum { ROWS = 7, MOST_KEPT = 256 };
 
 static int copy(cli_points_reader *reader, int32_t format, bool answers_only, const char *to) {
     const bool keep = !answers_only && format == reader->table.format && cli_points_can_keep(reader);
+    char names[2][80] = {"shadow.fuzz", "fuzz"};
     float values[2 * ROWS] = {1.0f, 0.5f, 1e-30f};
-    const cli_points_column columns[] = {{"shadow.fuzz", values, 2}, {"fuzz", values + 1, 2}};
+    const cli_points_answers answers = {names, values, 2};
     cli_points points = cli_points_create(ROWS, reader->has_normals, keep);
     cli_points_writer writer = {0};
-    int code = cli_points_writer_open(to, format, answers_only, reader, columns, 2, &writer);
+    int code = cli_points_writer_open(to, format, answers_only, reader, &answers, &writer);
     while (code == CLI_OK) {
         code = cli_points_read(reader, MOST_KEPT, &points);
         if (code != CLI_OK || points.count == 0) {

@@ -1,5 +1,5 @@
 /* The folder of new bakes, the child processes that bake into it, and golden bakes that are replaced. */
-#define _GNU_SOURCE /* scandirat, memfd_create */
+#define _GNU_SOURCE /* memfd_create */
 #include "cli/message.h"
 #include "cli/paths.h"
 #include "cli/regress/regress.h"
@@ -8,12 +8,9 @@
 
 #include <dirent.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <fnmatch.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/stat.h>
@@ -28,83 +25,13 @@ static int fail_making(const char *path) {
     return CLI_FILE;
 }
 
-/* Opens a folder, but no link to one; -1 if that fails. */
-static int open_folder(const char *path) {
-    return open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-}
-
-/* Removes a folder that has no folders in it. */
-static void remove_folder(int folder, const char *path) {
-    struct dirent **entries = NULL;
-    const int count = scandirat(folder, ".", &entries, NULL, NULL);
-    for (int i = 0; i < count; ++i) {
-        unlinkat(folder, entries[i]->d_name, 0); /* fails for "." and ".." */
-        free(entries[i]);
-    }
-    free(entries);
-    rmdir(path);
-}
-
-static int is_folder_of_bakes(const struct dirent *entry) {
-    return fnmatch("vdbshade-regress-??????", entry->d_name, 0) == 0;
-}
-
-/* Removes folders of killed runs: those with such a name that belong to this user, and that nobody locks. */
-static void remove_old_folders(const char *place) {
-    struct dirent **entries = NULL;
-    const int count = scandir(place, &entries, is_folder_of_bakes, NULL);
-    for (int i = 0; i < count; ++i) {
-        char *path = regress_path(place, entries[i]->d_name);
-        const int folder = open_folder(path);
-        struct stat status;
-        if (folder >= 0 && fstat(folder, &status) == 0 && status.st_uid == geteuid() &&
-            (status.st_mode & 0777) == 0700 && flock(folder, LOCK_EX | LOCK_NB) == 0) {
-            remove_folder(folder, path);
-        }
-        close(folder);
-        free(path);
-        free(entries[i]);
-    }
-    free(entries);
-}
-
-/* Locks a new folder. Another run may have removed it before, so checks that it still exists. */
-static bool lock_folder(int folder, const char *path) {
-    struct stat held, there;
-    const bool locked =
-        flock(folder, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK; /* some file systems have no locks */
-    return locked && fstat(folder, &held) == 0 && stat(path, &there) == 0 && held.st_dev == there.st_dev &&
-           held.st_ino == there.st_ino;
-}
-
-static int make_temporary_folder(regress_work *work) {
-    enum { ATTEMPTS = 16 };
-    const char *place = getenv("TMPDIR");
-    place = place != NULL && place[0] == '/' ? place : "/tmp";
-    remove_old_folders(place);
-    for (int i = 0; i < ATTEMPTS; ++i) {
-        free(work->bakes);
-        work->bakes = regress_path(place, "vdbshade-regress-XXXXXX");
-        if (mkdtemp(work->bakes) == NULL) {
-            break;
-        }
-        const int folder = open_folder(work->bakes);
-        if (folder >= 0 && lock_folder(folder, work->bakes)) {
-            work->folder_of_bakes = folder + 1;
-            return CLI_OK;
-        }
-        if (folder >= 0) {
-            close(folder);
-        }
-    }
-    cli_say("folder for new bakes: %s: cannot be made: %s", place, strerror(errno));
-    return CLI_FILE;
-}
-
 int regress_make_folder(regress_work *work) {
     const char *given = work->settings->bakes;
     if (given == NULL) {
-        return make_temporary_folder(work);
+        const char *place = getenv("TMPDIR");
+        work->bakes =
+            regress_path(place != NULL && place[0] == '/' ? place : "/tmp", "vdbshade-regress-XXXXXX");
+        return mkdtemp(work->bakes) != NULL ? CLI_OK : fail_making(work->bakes);
     }
     if (mkdir(given, 0777) != 0 && errno != EEXIST) {
         return fail_making(given);
@@ -114,11 +41,19 @@ int regress_make_folder(regress_work *work) {
 }
 
 void regress_remove_folder(regress_work *work) {
-    if (work->folder_of_bakes > 0) {
-        remove_folder(work->folder_of_bakes - 1, work->bakes);
-        close(work->folder_of_bakes - 1);
-        work->folder_of_bakes = 0;
+    if (work->settings->bakes != NULL || work->bakes == NULL) {
+        return;
     }
+    struct dirent **entries = NULL;
+    const int count = scandir(work->bakes, &entries, NULL, NULL);
+    for (int i = 0; i < count; ++i) {
+        char *path = regress_path(work->bakes, entries[i]->d_name);
+        unlink(path); /* fails for "." and ".." */
+        free(path);
+        free(entries[i]);
+    }
+    free(entries);
+    rmdir(work->bakes);
 }
 
 /* --- baking */
@@ -192,8 +127,6 @@ static int run_child(const char *what, const char *folder, char **words) {
 }
 
 static void list_words(const regress_work *work, const regress_case *one, regress_lines *words) {
-    static const char *const sandbox[] = {
-        [CLI_SANDBOX_AUTO] = "auto", [CLI_SANDBOX_OFF] = "off", [CLI_SANDBOX_REQUIRE] = "require"};
     regress_add_line(words, "vdbshade");
     regress_add_line(words, "%s", one->command->name);
     /* a scene "--stats=x.json" is a file in the folder, and no option */
@@ -208,7 +141,7 @@ static void list_words(const regress_work *work, const regress_case *one, regres
     }
     regress_add_line(words, "--quiet");
     regress_add_line(words, "--memory-limit=%llu", (unsigned long long)cli_given.memory_limit);
-    regress_add_line(words, "--sandbox=%s", sandbox[cli_given.sandbox]);
+    regress_add_line(words, "--sandbox=%s", cli_given.sandbox);
     if (cli_given.threads > 0) {
         regress_add_line(words, "--threads=%d", cli_given.threads);
     }

@@ -127,17 +127,6 @@ int regress_list_inputs(const regress_work *work, regress_case *one) {
 
 /* --- the cache: the lines above for each case that was alike */
 
-static bool has_line(json_t *lines, const char *text) {
-    size_t i;
-    json_t *line;
-    json_array_foreach(lines, i, line) {
-        if (json_is_string(line) && strcmp(json_string_value(line), text) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Names the input of a line: a file's name, or the text before the colon. */
 static char *name_of(const char *line) {
     static const char input[] = "vdbshade_input_", sum[] = "sha256:";
@@ -149,16 +138,14 @@ static char *name_of(const char *line) {
 }
 
 static void look_up(json_t *lines, regress_case *one) {
-    if (!json_is_array(lines)) {
-        return;
+    for (size_t i = 0; lines != NULL && i < one->inputs.count; ++i) {
+        const char *line = json_string_value(json_array_get(lines, i));
+        if (line == NULL || strcmp(line, one->inputs.line[i]) != 0) {
+            one->changed = name_of(one->inputs.line[i]);
+            return;
+        }
     }
-    const char *first = NULL;
-    for (size_t i = 0; i < one->inputs.count && first == NULL; ++i) {
-        first = has_line(lines, one->inputs.line[i]) ? NULL : one->inputs.line[i];
-    }
-    if (first != NULL) {
-        one->changed = name_of(first);
-    } else if (json_array_size(lines) == one->inputs.count) {
+    if (json_array_size(lines) == one->inputs.count) {
         one->status = REGRESS_UNCHANGED;
     }
 }

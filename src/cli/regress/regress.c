@@ -158,30 +158,6 @@ static int compare_all(regress_work *work) {
 
 static const char *const status_names[] = {"unchanged", "alike", "not alike", "failed", "updated"};
 
-/* Prints how the replaced golden bake differed. */
-static void print_updated(const cli_comparison *c, const char *output) {
-    if (c->alike) {
-        return;
-    }
-    if (c->golden == NULL) {
-        printf("  %s: is the golden bake now; there was none\n", output);
-        return;
-    }
-    printf("  %s: is the golden bake now; the one before differed:\n", output);
-    const char *problem;
-    const vsh_channel_comparison *channel;
-    for (size_t i = 0; (problem = cli_comparison_problem(c, i)) != NULL; ++i) {
-        printf("    %s\n", problem);
-    }
-    for (size_t i = 0; (channel = vsh_comparison_channel(c->made, i)) != NULL; ++i) {
-        char what[CLI_EXPLANATION];
-        cli_channel_explain(channel, what);
-        if (what[0] != '\0') {
-            printf("    %s: %s\n", channel->name, what);
-        }
-    }
-}
-
 static const char *failure_of(const regress_case *one, char *text, size_t size) {
     snprintf(text, size, "the bake ended with exit code %d%s%s", one->code,
              one->reason[0] != '\0' ? ": " : "", one->reason);
@@ -200,8 +176,8 @@ static void print_lines(const regress_work *work) {
             if (one->status == REGRESS_FAILED) {
                 char why[1200];
                 printf("  %s: %s\n", one->outputs.line[k], failure_of(one, why, sizeof why));
-            } else if (one->status == REGRESS_UPDATED) {
-                print_updated(&one->comparisons[k], one->outputs.line[k]);
+            } else if (one->status == REGRESS_UPDATED && one->comparisons[k].golden == NULL) {
+                printf("  %s: is the golden bake now\n", one->outputs.line[k]);
             } else if (one->status != REGRESS_UNCHANGED && !one->comparisons[k].alike) {
                 char prefix[300];
                 snprintf(prefix, sizeof prefix, "  %.250s: ", one->outputs.line[k]);

@@ -46,7 +46,6 @@ typedef struct regress_work {
     char *golden;                           /* folder of golden bakes */
     char *cache;                            /* file */
     char *bakes;                            /* folder of the new bakes, absolute */
-    int folder_of_bakes;                    /* descriptor + 1 of that folder if it is temporary */
     char program[64 + 2 * VSH_DIGEST_TEXT]; /* its version, its hash, and that of the library */
     regress_case *cases;
     size_t case_count;
@@ -82,8 +81,7 @@ void regress_read_cache(regress_work *work);
 /* Saves the inputs of cases that are alike. */
 int regress_write_cache(const regress_work *work);
 
-/* Makes the folder for new bakes. Without --bakes it is temporary, and folders of killed runs of this user
- * are removed: each run locks its folder. */
+/* Makes the folder for new bakes; without --bakes it is temporary. */
 int regress_make_folder(regress_work *work);
 
 /* Removes the folder if it is temporary. */
