@@ -219,7 +219,3 @@ TEST(masks_that_are_none_are_refused) {
         assert_null(triangles);
     }
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -14,7 +14,7 @@ TEST(what_is_said_of_a_triangle_holds_all_over_it) {
         for (int k = 0; k < WIDE * HIGH; ++k) {
             alpha[k] = k % 4 == 0 ? alpha[k] : i % 2 == 0 ? 255 : 0;
         }
-        vshi_mask_table table;
+        FREED_BY(vshi_mask_table_free) vshi_mask_table table;
         assert_ok(vshi_mask_table_create(&mask, NULL, &table, &failure));
         for (int k = 0; k < 20; ++k) {
             float uvs[3][2];
@@ -39,7 +39,6 @@ TEST(what_is_said_of_a_triangle_holds_all_over_it) {
                 assert_true(cover == VSHI_MASK_OPAQUE ? off > -1e-6 : off < 1e-6);
             }
         }
-        vshi_mask_table_free(&table);
     }
     assert_true(told[VSHI_MASK_CLEAR] > 200 && told[VSHI_MASK_OPAQUE] > 200 && told[VSHI_MASK_MIXED] > 1000);
 }
@@ -54,10 +53,9 @@ TEST(what_lies_beyond_numbers_is_opaque) {
             const vshi_mask_place at = vshi_alpha_mask_place(&mask, (const float[]){values[i], values[i]});
             assert_int_equal(vshi_alpha_mask_opaque(&mask, at), !isfinite(values[i]));
             const vshi_mask_place corners[3] = {at, {0.0, 0.0}, {1.0, 0.0}};
-            vshi_mask_table table;
+            FREED_BY(vshi_mask_table_free) vshi_mask_table table;
             assert_ok(vshi_mask_table_create(&mask, NULL, &table, &failure));
             assert_true(vshi_mask_table_cover(&table, corners) != VSHI_MASK_CLEAR || isfinite(values[i]));
-            vshi_mask_table_free(&table);
         }
     }
 }
@@ -67,7 +65,7 @@ TEST(pieces_are_the_opaque_part_to_within_their_size) {
     const vsh_run run = vsh_run_default();
     double before = 0.0;
     for (double size = 0.2; size > 0.01; size *= 0.5) {
-        vshi_mask_pieces pieces;
+        FREED_BY(vshi_mask_pieces_free) vshi_mask_pieces pieces;
         assert_ok(vshi_mask_pieces_cut(&c->mesh, size, &run, &pieces, &failure));
         double area = 0.0, farthest = 0.0;
         for (size_t i = 0; i < pieces.count; ++i) {
@@ -84,16 +82,14 @@ TEST(pieces_are_the_opaque_part_to_within_their_size) {
         assert_true(farthest < DISC_RADIUS + 1.5 * size);
         assert_true(before == 0.0 || area < before);
         before = area;
-        vshi_mask_pieces_free(&pieces);
     }
 }
 
 TEST(pieces_keep_to_the_memory_limit) {
     FREED card *c = card_at(1.0f);
     const vsh_run run = run_within(1 << 20);
-    vshi_mask_pieces pieces;
+    FREED_BY(vshi_mask_pieces_free) vshi_mask_pieces pieces;
     assert_fails(vshi_mask_pieces_cut(&c->mesh, 1e-9, &run, &pieces, &failure), VSH_ERROR_LIMIT, "'card'");
-    vshi_mask_pieces_free(&pieces);
 }
 
 TEST(voxels_hold_the_disc_and_not_the_card) {
@@ -131,8 +127,4 @@ TEST(voxels_hold_the_disc_and_not_the_card) {
     assert_true(inside > 50 && between > 100);
     vsh_occluders_free(made[0]);
     vsh_occluders_free(made[1]);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

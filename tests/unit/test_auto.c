@@ -97,7 +97,7 @@ TEST(the_default_is_exact_with_triangles_and_adaptive_without) {
     static shape s;
     s = (shape){.mesh = {.vertex_count = 0}};
     add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
-    casting c = make(&s.mesh, 1, 0.05);
+    FREED_BY(caster_free) casting c = make(&s.mesh, 1, 0.05);
     const vsh_points points = board(1.0, 0.0);
     for (int traced = 0; traced < 2; ++traced) {
         vsh_shade_options options = vsh_shade_options_default(), named = options;
@@ -115,14 +115,13 @@ TEST(the_default_is_exact_with_triangles_and_adaptive_without) {
         assert_int_equal(vsh_shadow_method_resolve(VSH_SHADOW_AUTO, traced), named.method);
         assert_int_equal(vsh_ao_method_resolve(VSH_AO_AUTO, traced), named.ao_method);
     }
-    caster_free(&c);
 }
 
 TEST(a_layer_takes_the_method_that_its_own_triangles_allow) {
     static shape s;
     s = (shape){.mesh = {.vertex_count = 0}};
     add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
-    casting c = make(&s.mesh, 1, 0.05);
+    FREED_BY(caster_free) casting c = make(&s.mesh, 1, 0.05);
     const vsh_points points = board(1.0, 0.0);
     vsh_layer layer = vsh_layer_default();
     layer.field = c.field; /* no triangles */
@@ -134,7 +133,6 @@ TEST(a_layer_takes_the_method_that_its_own_triangles_allow) {
     shade_by(&casters, &points, &options, other);
     assert_memory_equal(values, other, sizeof values);
     assert_ok(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL, &failure));
-    caster_free(&c);
 }
 
 TEST(rays_follow_from_the_error_unless_they_are_limited) {
@@ -143,7 +141,7 @@ TEST(rays_follow_from_the_error_unless_they_are_limited) {
     for (int i = 0; i < 10; ++i) {
         add_box(&s, -1.0 + 0.2 * i, 0.5, -1.0, -0.92 + 0.2 * i, 0.55, 1.0);
     }
-    casting c = make(&s.mesh, 1, 0.03);
+    FREED_BY(caster_free) casting c = make(&s.mesh, 1, 0.03);
     const vsh_points points = board(1.0, 0.0);
     vsh_shade_options options = vsh_shade_options_default();
     options.max_error = 0.003;
@@ -156,7 +154,6 @@ TEST(rays_follow_from_the_error_unless_they_are_limited) {
                   told);
     assert_true(free <= 0.003 && said <= 0.003 && said >= 0.9 * free);
     assert_true(limited > 0.003 && told > 0.003);
-    caster_free(&c);
 }
 
 TEST(parts_thinner_than_voxels_are_found_lost) {
@@ -169,7 +166,7 @@ TEST(parts_thinner_than_voxels_are_found_lost) {
     const vsh_mesh meshes[2] = {fence.mesh, block.mesh};
     const double voxels[3] = {0.12, 0.05, 0.012};
     for (int v = 0; v < 3; ++v) {
-        casting c = make(meshes, 2, voxels[v]);
+        FREED_BY(caster_free) casting c = make(meshes, 2, voxels[v]);
         vsh_lost lost[2];
         assert_ok(vsh_field_find_lost(c.field, meshes, 2, c.triangles, lost, &failure));
         print_message("voxel %g: %.3f of the fence, %.3f of the block; thin %.4f\n", voxels[v], lost[0].share,
@@ -181,7 +178,6 @@ TEST(parts_thinner_than_voxels_are_found_lost) {
         } else {
             assert_true(lost[0].share < 0.005);
         }
-        caster_free(&c);
     }
 }
 
@@ -205,12 +201,11 @@ TEST(voxels_coarser_than_casters_cost_exact_no_error) {
     const shape *const shapes[2] = {&slats, &cards};
     for (int which = 0; which < 2; ++which) {
         for (double voxel = 0.2; voxel > 0.02; voxel *= 0.5) {
-            casting c = make(&shapes[which]->mesh, 1, voxel);
+            FREED_BY(caster_free) casting c = make(&shapes[which]->mesh, 1, voxel);
             vsh_shade_options options = vsh_shade_options_default();
             const double rmse = rmse_to_truth(&c, &points, &options);
             print_message("%s, voxels of %g: %.4f\n", which ? "cards" : "slats", voxel, rmse);
             assert_true(rmse <= 0.02);
-            caster_free(&c);
         }
     }
 }
@@ -232,15 +227,15 @@ TEST(ao_between_texels_keeps_the_error_beside_what_is_low) {
         add_box(&low, x, -0.005, -0.9, x + 0.03, 0.012, 0.9);
     }
     const vsh_mesh meshes[2] = {ground.mesh, low.mesh};
-    casting c = make(meshes, 2, VOXEL);
+    FREED_BY(caster_free) casting c = make(meshes, 2, VOXEL);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
-    vsh_charts *charts = NULL;
-    vsh_texels *of = NULL;
+    OWNED(vsh_charts) *charts = NULL;
+    OWNED(vsh_texels) *of = NULL;
     assert_ok(vsh_charts_create(&ground.mesh, 1, &size, NULL, NULL, &charts, &failure));
     assert_ok(vsh_texels_create(charts, NULL, &of, &failure));
     const vsh_texel_samples samples = vsh_texels_samples(of);
-    float *open = malloc(samples.count * sizeof *open);
+    FREED float *open = malloc(samples.count * sizeof *open);
     assert_ok(vsh_trace_ao(c.triangles, NULL, samples.count, samples.positions, samples.normals, LIFT, 0.5,
                            1024, NULL, open, &failure));
     vsh_shade_options options = vsh_shade_options_default();
@@ -257,12 +252,4 @@ TEST(ao_between_texels_keeps_the_error_beside_what_is_low) {
     }
     print_message("AO over %g texels beside low slats: %.4f\n", count, sqrt(sum / count));
     assert_true(count > 0.5 * TEXELS && sqrt(sum / count) <= 0.02);
-    free(open);
-    vsh_texels_free(of);
-    vsh_charts_free(charts);
-    caster_free(&c);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

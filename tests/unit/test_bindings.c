@@ -73,7 +73,6 @@ TEST(one_thread_alone_hands_on) {
 }
 
 static double ring(void *user, const double p[3]) {
-    (void)user;
     return hypot(hypot(p[0], p[2]) - 0.7, p[1]) - 0.25;
 }
 
@@ -115,8 +114,4 @@ TEST(without_a_callback_there_is_none) {
     assert_null(grid);
     assert_int_equal(vsh_grid_from_distances(NULL, rings, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_grid_from_distances(&field, rings, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -60,7 +60,7 @@ static int lights_of(vsh_light lights[4]) {
 
 TEST(blocks_save_samples_and_change_no_value) {
     place_points();
-    casting made = caster_of(truth_seeds(), 0.02, 0.0);
+    FREED_BY(caster_free) casting made = caster_of(truth_seeds(), 0.02, 0.0);
     vsh_light lights[4];
     const int light_count = lights_of(lights);
     for (int l = 0; l < light_count; ++l) {
@@ -79,12 +79,11 @@ TEST(blocks_save_samples_and_change_no_value) {
             assert_int_equal(different, 0);
         }
     }
-    caster_free(&made);
 }
 
 TEST(no_block_is_proved_wrong) {
     place_points();
-    casting made = caster_of(truth_seeds(), 0.02, 0.0);
+    FREED_BY(caster_free) casting made = caster_of(truth_seeds(), 0.02, 0.0);
     vsh_light lights[4];
     const int light_count = lights_of(lights);
     const double up[3] = {0.0, 1.0, 0.0};
@@ -118,9 +117,4 @@ TEST(no_block_is_proved_wrong) {
             assert_true((double)proved > 0.7 * (double)decided);
         }
     }
-    caster_free(&made);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -99,7 +99,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
              "\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
              casters);
     OWNED(vsh_scene) *scene = NULL;
-    vsh_assets *assets = NULL;
+    OWNED(vsh_assets) *assets = NULL;
     assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &failure) !=
                   VSH_OK ||
               vsh_assets_load(scene, NULL, &assets, &failure));
@@ -122,7 +122,6 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     OWNED(vsh_field) *empty = empty_field();
     assert_ok(vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap,
                                 NULL, &failure));
-    vsh_assets_free(assets);
 }
 
 TEST(texels_within_a_sphere_or_a_terrain_are_not_valid) {
@@ -149,8 +148,4 @@ TEST(texels_within_a_sphere_or_a_terrain_are_not_valid) {
     }
     print_message("%zu\n", invalid);
     assert_true(invalid > TEXELS * TEXELS * 2 / 5 && invalid < TEXELS * TEXELS * 3 / 5);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

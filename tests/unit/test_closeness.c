@@ -99,7 +99,3 @@ TEST(the_least_gap_is_that_of_all_borders) {
     print_message("%d of charts that are close, %d of others\n", close, apart);
     assert_true(close > 10 && apart > 10);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

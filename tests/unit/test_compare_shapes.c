@@ -13,7 +13,6 @@ typedef struct ramp {
 
 static double ramp_at(const void *user, double x, double y, double z) {
     const ramp *r = user;
-    (void)z;
     const double across = (x - 0.5 * SIDE + 0.3) * cos(r->angle) + (y - 0.5 * SIDE) * sin(r->angle);
     const double off = r->noise > 0.0 ? r->noise * noise((uint32_t)(y * SIDE + x)) : 0.0;
     return fmin(1.0, fmax(0.0, 0.5 + across / r->width)) + off;
@@ -119,6 +118,7 @@ TEST(noise_does_not_change_a_penumbras_width) {
 
 TEST(an_edge_that_is_cut_off_is_no_edge) {
     const ramp r = {30.0, 0.0, 0.0};
+    FREED_BY(free_plane)
     plane golden = make_plane(SIDE, SIDE, 1, ramp_at, &r), values = make_plane(SIDE, SIDE, 1, ramp_at, &r);
     uint8_t mask[SIDE * SIDE];
     for (size_t i = 0; i < SIDE * SIDE; ++i) {
@@ -127,8 +127,6 @@ TEST(an_edge_that_is_cut_off_is_no_edge) {
     const vsh_measures m = measure(&golden, &values, mask);
     assert_int_equal(m.pairs, 8);
     assert_true(isnan(m.value[VSH_MEASURE_PENUMBRA])); /* too few to say anything */
-    free(golden.values);
-    free(values.values);
 }
 
 /* --- displacement: a soft ball */
@@ -196,6 +194,7 @@ TEST(bakes_that_differ_by_rounding_are_alike) {
     const vsh_limits limits = vsh_limits_default();
     for (double soft = 0.01; soft < 10.0; soft *= 4.0) { /* from hard edges to wide ones */
         const ball golden = {{40.0, 45.0, 0.0}, 18.0, soft};
+        FREED_BY(free_plane)
         plane a = make_plane(SIDE, SIDE, 1, ball_at, &golden),
               b = make_plane(SIDE, SIDE, 1, ball_at, &golden);
         for (uint32_t i = 0; i < SIDE * SIDE; ++i) {
@@ -210,8 +209,6 @@ TEST(bakes_that_differ_by_rounding_are_alike) {
         m = measure(&a, &b, NULL);
         assert_true(soft < 1.0 || m.value[VSH_MEASURE_MAX] > 1e-4);
         assert_int_equal(vsh_compare_judge(&m, &limits), 0);
-        free(a.values);
-        free(b.values);
     }
 }
 
@@ -223,7 +220,6 @@ typedef struct bar {
 
 static double bar_at(const void *user, double x, double y, double z) {
     const bar *b = user;
-    (void)z;
     const bool within = x >= 30.0 + b->moved && x < 30.0 + b->moved + b->wide && y >= 40.0 && y < 60.0;
     const bool other = x + y < 40.0; /* another shadow, that stays */
     return within ? b->dark : other ? 0.0 : 1.0;
@@ -290,12 +286,12 @@ TEST(faults_of_the_promised_size_fail) {
 }
 
 static double ball_in_a_corner(const void *user, double x, double y, double z) {
-    (void)user;
     return x * x + y * y + z * z < 16.0 ? 0.0 : 1.0;
 }
 
 TEST(a_region_in_space_is_counted_in_voxels) {
     const double lit = 1.0;
+    FREED_BY(free_plane)
     plane a = make_plane(12, 11, 10, ball_in_a_corner, NULL), b = make_plane(12, 11, 10, flat, &lit);
     const vsh_measures m = measure(&a, &b, NULL);
     uint64_t voxels = 0;
@@ -304,10 +300,4 @@ TEST(a_region_in_space_is_counted_in_voxels) {
     }
     assert_int_equal(m.lost.count, voxels);
     assert_memory_equal(m.lost.max, ((const int32_t[3]){3, 3, 3}), sizeof m.lost.max);
-    free(a.values);
-    free(b.values);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

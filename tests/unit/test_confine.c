@@ -105,7 +105,6 @@ TEST(a_missing_reader_is_an_error_that_says_how_to_do_without) {
 /* --- what is read in this process */
 
 static int32_t cancel_later(void *user, const char *stage, double fraction) {
-    (void)stage;
     double *seen = user;
     *seen = fraction;
     return fraction > 0.2;
@@ -129,8 +128,6 @@ TEST(spheres_are_cancelled_within_a_file_of_any_size) {
 }
 
 static int32_t cancel_soon(void *user, const char *stage, double fraction) {
-    (void)stage;
-    (void)fraction;
     int *calls = user;
     return ++*calls > 10;
 }
@@ -180,12 +177,10 @@ TEST(hashing_is_cancelled_within_a_file) {
 }
 
 static int make_folder(void **state) {
-    (void)state;
     return mkdtemp(folder) != NULL ? 0 : -1;
 }
 
 static int remove_folder(void **state) {
-    (void)state;
     unlink(at("spheres.csv"));
     unlink(at("sparse.csv"));
     unlink(at("zeros.csv"));
@@ -193,10 +188,4 @@ static int remove_folder(void **state) {
     return rmdir(folder);
 }
 
-int main(int argc, char **argv) {
-    const int served = vsh_reader_serve(argc, argv);
-    if (served >= 0) {
-        _exit(served);
-    }
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

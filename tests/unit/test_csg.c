@@ -125,7 +125,3 @@ TEST(bounds_become_distances_up_to_their_corners) {
         assert_true(worst[1] < 0.5);
     }
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -134,12 +134,12 @@ TEST(places_fill_the_dome_above_a_plane_evenly) {
 }
 
 int main(void) {
-    vsh_model *model = NULL;
+    OWNED(vsh_model) *model = NULL;
     if (vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure) != VSH_OK) {
         return 1;
     }
     const size_t count = vsh_model_mesh_count(model);
-    vsh_mesh *meshes = calloc(count, sizeof *meshes);
+    FREED vsh_mesh *meshes = calloc(count, sizeof *meshes);
     for (size_t i = 0; i < count; ++i) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
@@ -150,7 +150,5 @@ int main(void) {
     const int failed = run_all_tests(NULL, NULL);
     vsh_triangles_free(triangles);
     vshi_sampler_free(sampler);
-    free(meshes);
-    vsh_model_free(model);
     return failed;
 }

@@ -43,15 +43,12 @@ static uint64_t hash(uint64_t h, const void *data, size_t size) {
 }
 
 static int32_t look(void *user, const char *stage, double fraction) {
-    (void)stage;
-    (void)fraction;
     *(size_t *)user += vshi_floats_differ(vshi_floats_get()) != 0;
     return 0;
 }
 
 /* A torus whose every distance is asked for from some thread of the pool. */
 static double ring(void *user, const double p[3]) {
-    (void)user;
     if (vshi_floats_differ(vshi_floats_get())) {
         return (double)NAN; /* refused with VSH_ERROR_INPUT */
     }
@@ -168,7 +165,7 @@ TEST(no_setting_of_the_host_shows_and_all_are_given_back) {
 
 /* Lengths that are denormal numbers, and scenes that have them, are what they are. */
 TEST(denormals_are_numbers) {
-    casting c = caster_of(truth_seeds(), 0.1, 2.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.1, 2.0);
     const double p[3] = {0.3, 1e-310, 0.2}, zero[3] = {0.3, 0.0, 0.2};
     const float tiny[3] = {0.0f, 1e-41f, 1e-44f}, up[3] = {0.0f, 1.0f, 0.0f};
     const double towards[3] = {5e-324, 1e-310, 0.0};
@@ -190,9 +187,4 @@ TEST(denormals_are_numbers) {
             assert_true(fabsf(a - b) <= 1e-2f); /* the normal is turned by a thousandth */
         }
     }
-    caster_free(&c);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

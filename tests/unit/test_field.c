@@ -413,7 +413,3 @@ TEST(a_voxel_takes_no_more_than_eighteen_bytes) {
         assert_true(each > 2.0 && each <= 18.0);
     }
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -6,61 +6,6 @@
 
 #define VOXEL 0.04
 
-static void random_point(uint64_t *counter, double margin, double p[3]) {
-    p[0] = between(counter, -3.0 - margin, 3.0 + margin);
-    p[1] = between(counter, -0.5 - margin, 2.0 + margin);
-    p[2] = between(counter, -3.0 - margin, 3.0 + margin);
-}
-
-static void assert_same_fields(const vsh_field *a, const vsh_field *b) {
-    vsh_field_info x, y;
-    vsh_field_get_info(a, &x);
-    vsh_field_get_info(b, &y);
-    assert_int_equal(x.levels, y.levels);
-    assert_int_equal(x.bricks, y.bricks);
-    assert_int_equal(x.bytes, y.bytes);
-    size_t blocks = 0;
-    for (int32_t l = 0; l < a->level_count; ++l) {
-        const int32_t *size = a->levels[l].size;
-        assert_memory_equal(a->levels[l].origin, b->levels[l].origin, sizeof a->levels[l].origin);
-        assert_memory_equal(size, b->levels[l].size, sizeof a->levels[l].size);
-        assert_int_equal(a->levels[l].brick_count, b->levels[l].brick_count);
-        blocks += (size_t)size[0] * (size_t)size[1] * (size_t)size[2];
-    }
-    assert_memory_equal(a->index, b->index, blocks * sizeof *a->index);
-    assert_int_equal(a->value_count, b->value_count);
-    assert_memory_equal(a->values, b->values, (size_t)a->value_count * sizeof *a->values);
-    assert_memory_equal(a->bounds_min, b->bounds_min, sizeof a->bounds_min);
-    assert_memory_equal(a->bounds_max, b->bounds_max, sizeof a->bounds_max);
-}
-
-TEST(any_number_of_threads_makes_the_same_bits) {
-    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
-    const int32_t threads[] = {1, 2, 5};
-    vsh_field *fields[3];
-    for (int i = 0; i < 3; ++i) {
-        const vsh_run run = run_on(threads[i]);
-        assert_ok(vsh_field_create(grid, NULL, &run, &fields[i], &failure));
-        assert_same_fields(fields[0], fields[i]);
-    }
-    enum { COUNT = 100000 };
-    FREED double *positions = malloc(3 * COUNT * sizeof *positions);
-    FREED float *values = malloc(3 * COUNT * sizeof *values);
-    assert_non_null(positions);
-    assert_non_null(values);
-    uint64_t counter = 1;
-    for (size_t i = 0; i < COUNT; ++i) {
-        random_point(&counter, 1.0, positions + 3 * i);
-    }
-    for (int i = 0; i < 3; ++i) {
-        vsh_field_sample(fields[i], COUNT, positions, values + i * COUNT);
-        assert_memory_equal(values, values + i * COUNT, COUNT * sizeof *values);
-    }
-    for (int i = 0; i < 3; ++i) {
-        vsh_field_free(fields[i]);
-    }
-}
-
 TEST(the_memory_limit_covers_every_level) {
     OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     vsh_field *field = NULL;
@@ -203,8 +148,4 @@ TEST(a_huge_reach_is_refused_or_met) {
             assert_true(result == VSH_ERROR_LIMIT || result == VSH_ERROR_ARGUMENT);
         }
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -73,7 +73,7 @@ TEST(quantized_positions_stand_for_their_numbers) {
                 ",\"accessors\":[{\"bufferView\":0,\"componentType\":%d,\"count\":3,\"type\":\"VEC3\","
                 "\"normalized\":%s}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":24,\"byteStride\":8}]",
                 ",\"scale\":[2,2,2]", "", "", types[t].type, normalized ? "true" : "false");
-            vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
+            OWNED(vsh_model) *model = read_gltf(rest, buffer, sizeof buffer);
             const double unit = normalized ? 2.0 / types[t].most : 2.0;
             const double tolerance = normalized ? 1e-6 : 1e-6 * types[t].most;
             for (int i = 0; i < 3; ++i) {
@@ -82,7 +82,6 @@ TEST(quantized_positions_stand_for_their_numbers) {
                 assert_near(p.y, unit * (double)at[i][1], tolerance);
                 assert_near(p.z, unit * (double)at[i][2], tolerance);
             }
-            vsh_model_free(model);
         }
     }
 }
@@ -109,10 +108,9 @@ TEST(sparse_accessors_replace_elements) {
                  "0,\"byteOffset\":48,\"byteLength\":2},{\"buffer\":0,\"byteOffset\":52,"
                  "\"byteLength\":24}]",
                  "", "", "", with_view ? "\"bufferView\":0," : "");
-        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
+        OWNED(vsh_model) *model = read_gltf(rest, buffer, sizeof buffer);
         assert_at(corner_of(model, 0, 1), 5, 0, 0);
         assert_at(corner_of(model, 0, 2), 0, 7, 0);
-        vsh_model_free(model);
     }
     buffer[49] = 4;
     refused_gltf(rest, buffer, sizeof buffer, VSH_ERROR_INPUT, "sparse index 1 of 2 is 4", "accessors[0]");
@@ -193,10 +191,9 @@ TEST(sparse_indices_may_be_of_any_unsigned_type) {
                          "accessors[0]");
             continue;
         }
-        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
+        OWNED(vsh_model) *model = read_gltf(rest, buffer, sizeof buffer);
         assert_at(corner_of(model, 0, 1), 5, 0, 0);
         assert_at(corner_of(model, 0, 2), 0, 7, 0);
-        vsh_model_free(model);
     }
 }
 
@@ -206,13 +203,12 @@ TEST(strips_and_fans_become_triangles_of_one_winding) {
         char rest[1024], of[32];
         snprintf(of, sizeof of, "\"mode\":%d,", mode);
         snprintf(rest, sizeof rest, ONE_MESH "," FOUR_CORNERS, "", of, "", "", "", "");
-        vsh_model *model = read_gltf(rest, mode == 5 ? zigzag : corners, 48);
+        OWNED(vsh_model) *model = read_gltf(rest, mode == 5 ? zigzag : corners, 48);
         const vsh_mesh_report report = check(model, 0);
         assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 2);
         assert_int_equal(report.flipped_edges, 0);
         assert_int_equal(report.open_edges, 4);
         assert_near(report.area, 1.0, 1e-12);
-        vsh_model_free(model);
     }
 }
 
@@ -247,12 +243,11 @@ TEST(instances_stand_behind_their_node) {
              "\"TRANSLATION\":1}}}",
              "", "", "", ",{\"bufferView\":1,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}",
              ",{\"buffer\":0,\"byteOffset\":48,\"byteLength\":24}");
-    vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
+    OWNED(vsh_model) *model = read_gltf(rest, buffer, sizeof buffer);
     assert_int_equal(vsh_model_mesh_count(model), 2);
     assert_at(corner_of(model, 0, 1), 2, 0, 0);
     assert_at(corner_of(model, 1, 1), 8, 0, 0);
     assert_int_not_equal(vsh_model_mesh(model, 0, 0).object, vsh_model_mesh(model, 1, 0).object);
-    vsh_model_free(model);
 }
 
 /* Two joints with a matrix each; the node's own transform is none of the skin's business. */
@@ -295,13 +290,11 @@ TEST(alpha_comes_with_the_mesh) {
         char rest[1024];
         snprintf(rest, sizeof rest, "\"materials\":[{\"alphaMode\":\"%s\"}]," ONE_MESH "," FOUR_CORNERS,
                  modes[i], "", "\"material\":0,", "", "", "", "");
-        vsh_model *model = read_gltf(rest, corners, 48);
+        OWNED(vsh_model) *model = read_gltf(rest, corners, 48);
         assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, i);
-        vsh_model_free(model);
     }
-    vsh_model *model = read_text("a.obj", "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n");
+    OWNED(vsh_model) *model = read_text("a.obj", "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n");
     assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, VSH_ALPHA_OPAQUE);
-    vsh_model_free(model);
 }
 
 TEST(a_buffer_that_is_not_there_is_named) {
@@ -378,6 +371,4 @@ TEST(claims_of_memory_are_checked) {
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -131,12 +131,11 @@ TEST(sparse_parts_have_offsets_and_types_of_their_own) {
             refuse_made(m, ALONE MESH("\"POSITION\":7", ""), "its sparse part is wrong");
             continue;
         }
-        vsh_model *model = read_made(m, of == 0 ? ALONE MESH("\"POSITION\":5", "")
-                                                : ALONE MESH("\"POSITION\":0", ",\"indices\":6"));
+        OWNED(vsh_model) *model = read_made(m, of == 0 ? ALONE MESH("\"POSITION\":5", "")
+                                                       : ALONE MESH("\"POSITION\":0", ",\"indices\":6"));
         assert_corner(model, 0, 0, 0, 0, 0);
         assert_corner(model, 0, 1, of == 0 ? 5 : 0, of == 0 ? 0 : 1, 0);
         assert_corner(model, 0, 2, of == 0 ? 0 : 1, of == 0 ? 7 : 1, 0);
-        vsh_model_free(model);
     }
 }
 
@@ -146,12 +145,11 @@ TEST(morph_targets_move_normals_too) {
     maker *m = begin();
     add(m, moves, sizeof moves, "", FLOATS, 4, "VEC3", "");
     add(m, turns, sizeof turns, "", FLOATS, 4, "VEC3", "");
-    vsh_model *model =
+    OWNED(vsh_model) *model =
         read_made(m, ALONE "\"meshes\":[{\"weights\":[0.5],\"primitives\":[{\"attributes\":{\"POSITION\":0,"
                            "\"NORMAL\":1},\"targets\":[{\"POSITION\":2,\"NORMAL\":3}]}]}]");
     assert_corner(model, 0, 1, 1, 0, 1);
     assert_normal(model, 1, 0.4, 0, 0.6);
-    vsh_model_free(model);
 }
 
 /* A quad skinned to joints 1 (at 0, 4, 0, turned by a right angle about z) and 2 (at 10, 0, 0). */
@@ -183,12 +181,11 @@ TEST(skins_scale_weights_add_sets_and_turn_normals) {
             refuse_made(m, rest, wrong == 1 ? "joints are no four bytes" : "joint 1 is no node of the scene");
             continue;
         }
-        vsh_model *model = read_made(m, rest);
+        OWNED(vsh_model) *model = read_made(m, rest);
         assert_corner(model, 0, 0, 0, 4, 0);                    /* half of a joint is all of it */
         assert_corner(model, 0, 1, 0.5 * (0 + 11), 0.5 * 5, 0); /* two sets */
         assert_corner(model, 0, 2, -1, 5, 0);                   /* turned */
         assert_normal(model, 0, 0, 1, 0);
-        vsh_model_free(model);
     }
     maker *m = begin(); /* one matrix for two joints */
     static const float one[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
@@ -205,11 +202,10 @@ TEST(strips_leave_out_what_has_no_area_and_lists_what_is_over) {
     for (int mode = 4; mode <= 5; ++mode) {
         maker *m = begin();
         add(m, strip, sizeof strip, "", USHORTS, mode == 4 ? 5 : 6, "SCALAR", "");
-        vsh_model *model =
+        OWNED(vsh_model) *model =
             read_made(m, mode == 4 ? ALONE MESH("\"POSITION\":0", ",\"indices\":2")
                                    : ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5"));
         assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 1);
-        vsh_model_free(model);
     }
 }
 
@@ -230,7 +226,7 @@ TEST(vertices_that_are_not_used_take_nothing_of_others_with_them) {
     add(m, order, sizeof order, "", USHORTS, 3, "SCALAR", "");
     add(m, normals, sizeof normals, "", FLOATS, 4, "VEC3", "");
     add(m, uvs, sizeof uvs, "", FLOATS, 4, "VEC2", "");
-    vsh_model *model =
+    OWNED(vsh_model) *model =
         read_made(m, ALONE MESH("\"POSITION\":0,\"NORMAL\":3,\"TEXCOORD_0\":4,\"TEXCOORD_1\":4,"
                                 "\"TEXCOORD_2\":4",
                                 ",\"indices\":2"));
@@ -242,7 +238,6 @@ TEST(vertices_that_are_not_used_take_nothing_of_others_with_them) {
     assert_normal(model, 2, 0, 0, -1);
     assert_non_null(view.uvs);
     assert_true(view.uvs[0] == 0.1F && view.uvs[4] == 0.3F && view.uvs[5] == 0.75F);
-    vsh_model_free(model);
 }
 
 TEST(nodes_stand_by_rotation_matrix_and_scene) {
@@ -272,12 +267,11 @@ TEST(nodes_stand_by_rotation_matrix_and_scene) {
     for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
         char rest[1024];
         snprintf(rest, sizeof rest, "%s" MESH("\"POSITION\":0", ""), files[i].rest);
-        vsh_model *model = read_made(begin(), rest);
+        OWNED(vsh_model) *model = read_made(begin(), rest);
         assert_int_equal(vsh_model_mesh_count(model), 1);
         const double *b = files[i].second, *c = files[i].third;
         assert_corner(model, 0, 1, b[0], b[1], b[2]);
         assert_corner(model, 0, 2, c[0], c[1], c[2]);
-        vsh_model_free(model);
     }
 }
 
@@ -296,12 +290,11 @@ TEST(nodes_share_a_mesh_but_not_its_pose) {
         static const float weights[4][4] = {{1}, {1}, {1}, {1}};
         add(m, joints, sizeof joints, "", UBYTES, 4, "VEC4", "");
         add(m, weights, sizeof weights, "", FLOATS, 4, "VEC4", "");
-        vsh_model *model = read_made(m, rest);
+        OWNED(vsh_model) *model = read_made(m, rest);
         assert_int_equal(vsh_model_mesh_count(model), 3);
         assert_corner(model, order == 0 ? 0 : 1, 1, 1, 0, 0);
         assert_corner(model, order == 0 ? 1 : 0, 1, 3, 0, 0);
         assert_corner(model, 2, 1, 1, 8, 0);
-        vsh_model_free(model);
     }
 }
 
@@ -320,13 +313,10 @@ TEST(instances_turn_by_four_numbers_and_have_equally_many_of_each) {
             refuse_made(m, rest, "ROTATION has 2 elements for 3");
             continue;
         }
-        vsh_model *model = read_made(m, rest);
+        OWNED(vsh_model) *model = read_made(m, rest);
         assert_corner(model, 0, 1, 1, 0, 0);
         assert_corner(model, 1, 1, 4, 1, 0);
-        vsh_model_free(model);
     }
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

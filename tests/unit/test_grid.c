@@ -112,7 +112,6 @@ TEST(a_room_inside_a_solid_stays_a_room) {
 
 /* A bound that is too small by a third, and a cube root's worth of bend: only its zero can be trusted. */
 static double squashed(void *user, const double p[3]) {
-    (void)user;
     const double d = unit_sphere(p);
     return 0.6 * d / (1.0 + fabs(d));
 }
@@ -130,13 +129,11 @@ TEST(a_bound_becomes_a_distance) {
 }
 
 static double hole_in_the_middle(void *user, const double p[3]) {
-    (void)user;
     const double d = unit_sphere(p);
     return d < -0.02 && d > -0.03 ? NAN : d;
 }
 
 static double nowhere_near(void *user, const double p[3]) {
-    (void)user;
     return 5.0 + 0.1 * p[0];
 }
 
@@ -289,8 +286,4 @@ TEST(progress_rises_to_one_and_can_cancel) {
             assert_null(grid);
         }
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -5,7 +5,7 @@
 namespace {
 
 TEST(a_written_grid_comes_back_bit_for_bit) {
-    vsh_grid *grid = own_sphere(), *back = nullptr;
+    OWNED(vsh_grid) *grid = own_sphere(), *back = nullptr;
     const std::string path = in_folder("round.vdb"), again = in_folder("again.vdb");
     assert_int_equal(vsh_grid_write(grid, path.c_str(), nullptr, nullptr, 0, &failure), VSH_OK);
     Warnings warnings;
@@ -14,8 +14,6 @@ TEST(a_written_grid_comes_back_bit_for_bit) {
     assert_same(grid, back);
     assert_int_equal(vsh_grid_write(back, again.c_str(), "surface", nullptr, 0, &failure), VSH_OK);
     assert_true(content(path) == content(again));
-    vsh_grid_free(back);
-    vsh_grid_free(grid);
 }
 
 TEST(openvdb_reads_what_is_written) {
@@ -88,7 +86,7 @@ TEST(the_first_level_set_that_can_cast_is_taken_and_the_others_are_named) {
     for (const bool streamed : {false, true}) {
         const std::string path = several("several.vdb", streamed);
         Warnings warnings;
-        vsh_grid *grid = nullptr, *named = nullptr;
+        OWNED(vsh_grid) *grid = nullptr, *named = nullptr;
         assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &grid, &failure), VSH_OK, {});
         assert_int_equal(warnings.lines.size(), 1);
         for (const char *part : {"'first' casts", "'nothing' (it is empty)", "'skewed' (voxel size 1 x 2 x 1",
@@ -101,8 +99,6 @@ TEST(the_first_level_set_that_can_cast_is_taken_and_the_others_are_named) {
         assert_said(vsh_grid_read(path.c_str(), "first", &none.run, &named, &failure), VSH_OK, {});
         assert_true(none.lines.empty());
         assert_same(grid, named);
-        vsh_grid_free(grid);
-        vsh_grid_free(named);
     }
 }
 
@@ -182,7 +178,7 @@ TEST(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back) {
         const vsh_sdf tree = {&node, 1};
         vsh_grid_options options = vsh_grid_options_default();
         options.voxel_size = voxel;
-        vsh_grid *grid = nullptr, *back = nullptr;
+        OWNED(vsh_grid) *grid = nullptr, *back = nullptr;
         assert_said(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK, {});
         const std::string path = in_folder("tiny.vdb");
         Warnings warnings;
@@ -195,8 +191,6 @@ TEST(voxels_too_small_for_openvdb_are_refused_and_the_least_come_back) {
             assert_true(warnings.lines.empty());
             assert_same(grid, back);
         }
-        vsh_grid_free(back);
-        vsh_grid_free(grid);
     }
 }
 
@@ -278,9 +272,4 @@ TEST(a_full_disk_leaves_the_old_file) {
 
 } // namespace
 
-int main() {
-    if (!make_folder()) {
-        return 1;
-    }
-    return run_all_tests(nullptr, remove_folder);
-}
+FIXTURE(begin_folder, remove_folder)

@@ -29,17 +29,12 @@ TEST(grids_on_one_lattice_are_shifted_and_keep_their_values) {
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, aside}};
     OWNED(vsh_grid) *both = NULL;
     assert_ok(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure));
-    leaves all = leaves_of(both);
-    for (size_t i = 0; i < all.count; ++i) {
-        for (int v = 0; v < 512; ++v) {
-            double p[3];
-            voxel_position(&all, i, v, p);
-            const double q[3] = {p[0] - 27 * 0.03, p[1], p[2]};
-            const double expected = fmax(-0.09, fmin(0.09, fmin(unit_sphere(p), unit_sphere(q))));
-            assert_true(fabs((double)all.leaf[i].values[v] - expected) < 1e-6);
-        }
+    FREED_BY(free_leaves) leaves all = leaves_of(both);
+    for (size_t i = 0; i < 512 * all.count; ++i) {
+        double p[3];
+        const double value = value_at(&all, i, p), q[3] = {p[0] - 27 * 0.03, p[1], p[2]};
+        assert_near(value, fmax(-0.09, fmin(0.09, fmin(unit_sphere(p), unit_sphere(q)))), 1e-6);
     }
-    free(all.leaf);
 }
 
 static double moved_sphere(const double p[3]) { /* twice as large, its middle at 1, 2, 3 */
@@ -127,8 +122,4 @@ TEST(bad_unions_are_refused_with_the_reason) {
     instances[1] = instances[0];
     assert_fails(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure), VSH_ERROR_LIMIT, "limit of 1 MB");
     assert_null(both);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

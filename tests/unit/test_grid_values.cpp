@@ -14,7 +14,7 @@ TEST(turned_and_mirrored_grids_stay_where_they_are) {
     }
     openvdb::tools::changeBackground(grid->tree(), 2.0f * grid->background());
     const std::string path = save("turned.vdb", {grid}), copy = in_folder("turned2.vdb");
-    vsh_grid *read = nullptr, *back = nullptr;
+    OWNED(vsh_grid) *read = nullptr, *back = nullptr;
     Warnings warnings;
     assert_said(vsh_grid_read(path.c_str(), nullptr, &warnings.run, &read, &failure), VSH_OK, {});
     assert_true(warnings.lines.empty());
@@ -22,8 +22,6 @@ TEST(turned_and_mirrored_grids_stay_where_they_are) {
     assert_int_equal(vsh_grid_write(read, copy.c_str(), nullptr, nullptr, 0, &failure), VSH_OK);
     assert_said(vsh_grid_read(copy.c_str(), nullptr, nullptr, &back, &failure), VSH_OK, {});
     assert_same(read, back);
-    vsh_grid_free(back);
-    vsh_grid_free(read);
 }
 
 TEST(doubles_are_read) {
@@ -93,7 +91,7 @@ TEST(thin_walls_hold_distances) {
 
 // Shadows under the sphere, seen as the reader left it.
 std::vector<float> shadows_of(const vsh_grid *grid) {
-    vsh_occluders *occluders = nullptr;
+    OWNED(vsh_occluders) *occluders = nullptr;
     assert_said(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &failure), VSH_OK, {});
     std::vector<double> positions;
     for (int i = 0; i < 60; ++i) {
@@ -106,7 +104,6 @@ std::vector<float> shadows_of(const vsh_grid *grid) {
     assert_said(vsh_shade_shadow(occluders, &points, &light, nullptr, nullptr, visible.data(), nullptr,
                                  nullptr, &failure),
                 VSH_OK, {});
-    vsh_occluders_free(occluders);
     return visible;
 }
 
@@ -210,9 +207,4 @@ TEST(making_distances_anew_names_the_file_and_the_grid) {
 
 } // namespace
 
-int main() {
-    if (!make_folder()) {
-        return 1;
-    }
-    return run_all_tests(nullptr, remove_folder);
-}
+FIXTURE(begin_folder, remove_folder)

@@ -18,10 +18,10 @@
 enum { SIDE = 65 };
 
 TEST(a_solid_is_closed_wound_outwards_and_of_its_volume) {
-    float *values = hills(SIDE, 40);
+    FREED float *values = hills(SIDE, 40);
     vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
     source.base = 0.5;
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     vsh_mesh_report report;
     assert_int_equal(vsh_mesh_check(&mesh, &report, NULL), VSH_OK);
@@ -51,8 +51,6 @@ TEST(a_solid_is_closed_wound_outwards_and_of_its_volume) {
         }
     }
     assert_true(fabs(volume - expected) < 1e-4 * expected);
-    vsh_model_free(model);
-    free(values);
 }
 
 TEST(a_surface_lies_under_its_lightmap_as_the_image_does) {
@@ -61,7 +59,7 @@ TEST(a_surface_lies_under_its_lightmap_as_the_image_does) {
     values[1 * 5 + 3] = 1.0f;
     const vsh_heights_source source = {
         .columns = 5, .rows = 4, .values = values, .size = {8, 6}, .height = 3};
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SURFACE);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SURFACE);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     for (size_t i = 0; i < 20; ++i) {
         const float *p = mesh.positions + 3 * i, *uv = mesh.uvs + 2 * i, *n = mesh.normals + 3 * i;
@@ -75,19 +73,18 @@ TEST(a_surface_lies_under_its_lightmap_as_the_image_does) {
         assert_float_equal(n[0] / n[1], i == 7 ? -0.75 : i == 9 ? 1.5 : 0.0, 1e-5);
         assert_float_equal(n[2] / n[1], i == 3 ? -1.5 : i == 13 ? 0.75 : 0.0, 1e-5);
     }
-    vsh_model_free(model);
 }
 
 TEST(a_surface_keeps_the_heights_beside_each_texel_s_middle) {
     static const struct {
         size_t texels, most; /* columns of texels, and of heights that are kept */
     } cases[] = {{1, 5}, {15, 33}, {16, 50}, {32, SIDE}, {100, SIDE}};
-    float *values = hills(SIDE, SIDE);
+    FREED float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
     const vsh_run run = vsh_run_default();
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         const size_t texels[2] = {cases[i].texels, 8};
-        vsh_model *model = NULL;
+        OWNED(vsh_model) *model = NULL;
         assert_int_equal(vshi_model_of_heights(&source, VSH_HEIGHTS_SURFACE, texels, &run, &model, NULL),
                          VSH_OK);
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -104,9 +101,7 @@ TEST(a_surface_keeps_the_heights_beside_each_texel_s_middle) {
             /* one cell of the heights is all that lies between */
             assert_true((double)(mesh.uvs[2 * next] - mesh.uvs[2 * next - 2]) * (SIDE - 1) < 1.001);
         }
-        vsh_model_free(model);
     }
-    free(values);
 }
 
 static int stop_at_once(void *user, const char *stage, double fraction) {
@@ -116,14 +111,14 @@ static int stop_at_once(void *user, const char *stage, double fraction) {
 /* A band of 100 voxels took ten minutes. */
 TEST(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not) {
     enum { FINE = 257 };
-    float *values = hills(FINE, FINE);
+    FREED float *values = hills(FINE, FINE);
     const vsh_heights_source source = source_of(values, FINE, FINE, 10.0, 2.0);
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 24;
     options.half_width = 100.0;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     assert_fails(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "");
     const char *most = strstr(failure.message, "use at most ");
     assert_non_null(strstr(failure.message, "half_width 100"));
@@ -136,9 +131,6 @@ TEST(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not) {
     options.half_width = 12.0;
     run.progress = NULL;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure));
-    vsh_grid_free(grid);
-    vsh_model_free(model);
-    free(values);
 }
 
 TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
@@ -149,14 +141,14 @@ TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
     }
     const vsh_heights_source source = {
         .columns = SIDE, .rows = 5, .values = values, .size = {4, 4}, .height = 8, .base = 1};
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = 0.05;
     options.half_width = 8.0;
     vsh_grid *grid = NULL;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
-    vsh_field *field = field_of_grid(grid, 0.0);
+    OWNED(vsh_field) *field = field_of_grid(grid, 0.0);
     for (int i = 0; i < 40; ++i) {
         const double gap = -0.6 + 1.2 * i / 39.0, x = -1.0 + i * 0.05;
         const double position[3] = {x, 2.0 * (x + 2.0) + gap, 0.1};
@@ -164,8 +156,6 @@ TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
         vsh_field_sample(field, 1, position, &distance);
         assert_float_equal(distance, gap / sqrt(5.0), 0.01);
     }
-    vsh_field_free(field);
-    vsh_model_free(model);
 }
 
 /* A triangle's corners that begin elsewhere show the same, but the mesh is no terrain any more. */
@@ -181,12 +171,12 @@ static vsh_mesh reindexed(const vsh_mesh *mesh, uint32_t *indices) {
 
 TEST(a_terrain_is_solid_or_open_as_its_triangles_are) {
     static const double mirrors[12] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    float *values = hills(SIDE, 40);
+    FREED float *values = hills(SIDE, 40);
     const vsh_heights_source source = source_of(values, SIDE, 40, 10.0, 2.0);
-    uint32_t *indices = malloc(16 * SIDE * 40 * sizeof *indices);
+    FREED uint32_t *indices = malloc(16 * SIDE * 40 * sizeof *indices);
     assert_non_null(indices);
     for (int i = 0; i < 4; ++i) {
-        vsh_model *model = model_of(&source, i % 2 == 0 ? VSH_HEIGHTS_SOLID : VSH_HEIGHTS_SURFACE);
+        OWNED(vsh_model) *model = model_of(&source, i % 2 == 0 ? VSH_HEIGHTS_SOLID : VSH_HEIGHTS_SURFACE);
         vsh_mesh meshes[2] = {vsh_model_mesh(model, 0, -1)};
         meshes[0].transform = i < 2 ? NULL : mirrors;
         meshes[1] = reindexed(&meshes[0], indices);
@@ -215,10 +205,7 @@ TEST(a_terrain_is_solid_or_open_as_its_triangles_are) {
                             meshes[0].triangle_count);
         vshi_solidity_free(found[0]);
         vshi_solidity_free(found[1]);
-        vsh_model_free(model);
     }
-    free(indices);
-    free(values);
 }
 
 static double random_part(uint32_t *state) {
@@ -256,16 +243,16 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
         {-0.6, 0.8, 0, 5, 0.8, 0.6, 0, 1e3, 0, 0, 1, 0},       /* mirrored, and tilted */
         {1e-3, 2e-4, 0, 0, 0, 4e-3, 0, 0, 1e-4, 0, 1e-3, 0.1}, /* sheared */
     };
-    float *values = hills(COLUMNS, ROWS);
+    FREED float *values = hills(COLUMNS, ROWS);
     const vsh_heights_source source = source_of(values, COLUMNS, ROWS, 10.0, 2.0);
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
-    uint32_t *indices = malloc(8 * ROWS * COLUMNS * sizeof *indices);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    FREED uint32_t *indices = malloc(8 * ROWS * COLUMNS * sizeof *indices);
     assert_non_null(indices);
     for (size_t i = 0; i < sizeof transforms / sizeof transforms[0]; ++i) {
         vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
         mesh.transform = transforms[i];
         const vsh_mesh other = reindexed(&mesh, indices);
-        vsh_triangles *terrain = make_triangles(&mesh), *triangles = make_triangles(&other);
+        OWNED(vsh_triangles) *terrain = make_triangles(&mesh), *triangles = make_triangles(&other);
         assert_true(vsh_triangles_bytes(terrain) < vsh_triangles_bytes(triangles) / 4);
         uint32_t seed = (uint32_t)i;
         int apart[4] = {0};
@@ -293,12 +280,7 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
         for (int k = 0; k < 4; ++k) { /* rays that graze an edge */
             assert_true(apart[k] < RAYS / 1000);
         }
-        vsh_triangles_free(triangles);
-        vsh_triangles_free(terrain);
     }
-    free(indices);
-    vsh_model_free(model);
-    free(values);
 }
 
 TEST(every_instruction_set_finds_the_same_crossings) {
@@ -312,12 +294,12 @@ TEST(every_instruction_set_finds_the_same_crossings) {
         {VSH_ISA_AVX512, vshi_terrain_avx512}
 #endif
     };
-    float *values = hills(SIDE, SIDE);
+    FREED float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
-    vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     vshi_terrain grid;
-    vshi_relief relief;
+    FREED_BY(vshi_relief_free) vshi_relief relief;
     assert_true(vshi_mesh_is_terrain(&mesh, &grid));
     const double centre[3] = {0.0, 0.0, 0.0};
     assert_int_equal(vshi_relief_create(&mesh, grid, centre, 1.0, &relief, NULL), VSH_OK);
@@ -347,9 +329,6 @@ TEST(every_instruction_set_finds_the_same_crossings) {
         }
     }
     assert_true(crossed > 500);
-    vshi_relief_free(&relief);
-    vsh_model_free(model);
-    free(values);
 }
 
 /* A scene of one heightfield caster over an image in the tests' folder. */
@@ -408,7 +387,7 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
         write.bits = 32;
         assert_ok(vsh_image_write(at("hill.exr"), &image, &write, &failure));
         const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
-        vsh_model *model = model_of(&source, VSH_HEIGHTS_SOLID);
+        OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
         const vsh_points points = {stand_on_top(&mesh, 3, positions, normals), positions, normals, NULL};
         truth_mesh *rays = truth_mesh_create(&mesh, 1);
@@ -426,8 +405,8 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
             scene.light_count = 1;
             scene.ao = 1;
             scene.shade.ao_distance = 1.0;
-            vsh_assets *assets = NULL;
-            vsh_occluders *occluders = NULL;
+            OWNED(vsh_assets) *assets = NULL;
+            OWNED(vsh_occluders) *occluders = NULL;
             assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
             assert_ok(vsh_scene_occluders(&scene, assets, NULL, NULL, &occluders, &failure));
             assert_ok(vsh_shade_shadow(occluders, &points, &light, &scene.shade, NULL, shadow, NULL, NULL,
@@ -443,11 +422,8 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
             }
             print_message("hill %d%s: worst %.3f\n", hill, direct ? ", direct" : "", worst);
             assert_true(worst < 0.1);
-            vsh_occluders_free(occluders);
-            vsh_assets_free(assets);
         }
         truth_mesh_free(rays);
-        vsh_model_free(model);
     }
 }
 
@@ -479,7 +455,7 @@ TEST(images_of_8_16_and_32_bits_are_read) {
         options.bits = cases[k].bits;
         options.pack = color || strstr(cases[k].name, ".exr") != NULL ? NULL : "R=Y,G=Y,B=Y";
         assert_ok(vsh_image_write(at(cases[k].name), &image, &options, &failure));
-        vsh_assets *assets = NULL;
+        OWNED(vsh_assets) *assets = NULL;
         assert_ok(load(at(cases[k].name), &assets, &failure));
         size_t count = 0;
         const vsh_mesh *mesh = vsh_assets_caster(assets, 0, &count);
@@ -489,7 +465,6 @@ TEST(images_of_8_16_and_32_bits_are_read) {
             const double expected = 4.0 * (double)cases[k].scale * weight * (double)i / 36.0;
             assert_float_equal(mesh->positions[3 * i + 1], expected, cases[k].tolerance);
         }
-        vsh_assets_free(assets);
     }
 }
 
@@ -559,11 +534,11 @@ TEST(bad_sources_are_refused) {
 }
 
 TEST(memory_limits_hold_before_memory_is_taken) {
-    float *values = hills(SIDE, SIDE);
+    FREED float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
     vsh_run run = vsh_run_default();
     run.memory_limit = 3 * SIDE * SIDE;
-    vsh_heights *heights = NULL;
+    OWNED(vsh_heights) *heights = NULL;
     vsh_model *model = NULL;
     assert_fails(vsh_heights_create(&source, &run, &heights, &failure), VSH_ERROR_LIMIT, "");
     assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &run, &model, &failure), VSH_ERROR_LIMIT,
@@ -573,10 +548,6 @@ TEST(memory_limits_hold_before_memory_is_taken) {
     vsh_heights_info info;
     vsh_heights_get_info(heights, &info);
     assert_true(info.bytes <= run.memory_limit);
-    vsh_heights_free(heights);
-    free(values);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

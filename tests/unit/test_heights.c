@@ -89,7 +89,7 @@ TEST(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step) {
     static const double directions[][3] = {
         {-0.9, 0.2, 0.35}, {0.3, 0.6, -0.7}, {0.05, 1.0, 0.02}, {-0.9, -0.05, 0.35}};
     for (int turned = 0; turned < 2; ++turned) {
-        stage s = set_up(SIDE, SIDE, 2.0, turned ? transform : NULL);
+        FREED_BY(tear_down) stage s = set_up(SIDE, SIDE, 2.0, turned ? transform : NULL);
         for (size_t d = 0; d < sizeof directions / sizeof directions[0]; ++d) {
             const vsh_light light = sun(directions[d], RADIANS(3.0));
             static float values[POINTS], truth[POINTS];
@@ -102,7 +102,6 @@ TEST(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step) {
             print_message("direction %zu: %zu of %d differ\n", d, differ, POINTS);
             assert_true(differ <= POINTS / 50);
         }
-        tear_down(&s);
     }
 }
 
@@ -115,7 +114,7 @@ TEST(a_classic_march_is_the_least_height_over_the_cone_s_width) {
     }
     const vsh_heights_source source = {
         .columns = 65, .rows = 9, .values = plateau, .size = {64, 8}, .height = 4, .base = 1};
-    vsh_heights *heights = heights_of(&source);
+    OWNED(vsh_heights) *heights = heights_of(&source);
     static const double towards[3] = {1.0, 0.5, 0.0};
     const double w = 0.2;
     const vsh_light light = sun(towards, 2.0 * atan(w));
@@ -133,11 +132,10 @@ TEST(a_classic_march_is_the_least_height_over_the_cone_s_width) {
         }
         assert_float_equal(value[0], expected, 0.1); /* it steps over the edge */
     }
-    vsh_heights_free(heights);
 }
 
 TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
-    stage s = set_up(SIDE, SIDE, 2.0, NULL);
+    FREED_BY(tear_down) stage s = set_up(SIDE, SIDE, 2.0, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, -0.3, 0, 0, 5, 0};
     const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
     static const double up[3] = {0, 1, 0};
@@ -152,9 +150,4 @@ TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
         assert_true(values[2 - begin] == 0.0f);
         assert_true(begin == 0 ? isnan(values[0]) : values[2] == 1.0f);
     }
-    tear_down(&s);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

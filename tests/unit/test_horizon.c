@@ -126,7 +126,3 @@ TEST(what_knows_no_horizon_says_so) {
         VSH_ERROR_ARGUMENT);
     tear_down(s);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

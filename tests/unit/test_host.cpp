@@ -34,6 +34,8 @@ void *rtcNewDevice(const char *) {
 
 namespace {
 
+OWNER(vsh_provenance)
+
 std::string folder;
 
 // A failure on another thread than the test's is told by its text, not by cmocka.
@@ -67,11 +69,11 @@ Outcome work(int32_t threads = 0) {
     Outcome o;
     vsh_run run = vsh_run_default();
     run.threads = threads;
-    vsh_scene *scene = nullptr;
-    vsh_assets *assets = nullptr;
-    vsh_grid *grid = nullptr;
-    vsh_occluders *occluders = nullptr;
-    vsh_provenance *provenance = nullptr;
+    OWNED(vsh_scene) *scene = nullptr;
+    OWNED(vsh_assets) *assets = nullptr;
+    OWNED(vsh_grid) *grid = nullptr;
+    OWNED(vsh_occluders) *occluders = nullptr;
+    OWNED(vsh_provenance) *provenance = nullptr;
     vsh_error error{};
     const std::string path = folder + "/scene.json";
     if (o.check(vsh_scene_read(path.c_str(), nullptr, &scene, &error), error) &&
@@ -110,11 +112,6 @@ Outcome work(int32_t threads = 0) {
             o.add(list[i].value, std::strlen(list[i].value));
         }
     }
-    vsh_provenance_free(provenance);
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
     return o;
 }
 
@@ -239,8 +236,8 @@ TEST(many_threads_share_one_field) {
     const vsh_sdf sdf = {&node, 1};
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.voxel_size = 0.0625;
-    vsh_grid *grid = nullptr;
-    vsh_occluders *occluders = nullptr;
+    OWNED(vsh_grid) *grid = nullptr;
+    OWNED(vsh_occluders) *occluders = nullptr;
     vsh_error error{};
     assert_int_equal(vsh_grid_from_sdf(&sdf, &grid_options, nullptr, &grid, &error), VSH_OK);
     assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &error), VSH_OK);
@@ -250,23 +247,19 @@ TEST(many_threads_share_one_field) {
         vsh_error why{};
         vsh_run run = vsh_run_default();
         run.threads = threads;
-        vsh_voxels *voxels = nullptr;
-        vsh_volume *volume = nullptr;
+        OWNED(vsh_voxels) *voxels = nullptr;
+        OWNED(vsh_volume) *volume = nullptr;
         o.check(vsh_voxels_from_grid(grid, 2.0, &run, &voxels, &why), why);
         o.check(vsh_bake_volume(occluders, voxels, &light, 1, nullptr, &run, &volume, nullptr, &why), why);
         std::vector<float> values(40 * 40 * 40);
         const int32_t low[3] = {-20, -20, -20}, size[3] = {40, 40, 40};
         o.check(vsh_volume_copy(volume, 0, low, size, values.data(), &why), why);
         o.add(values.data(), values.size());
-        vsh_volume_free(volume);
-        vsh_voxels_free(voxels);
         return o;
     };
     const Outcome expected = bake(1);
     assert_true(expected.failure.empty());
     expect_same_on_threads(expected, 12, [&](size_t i) { return bake(int32_t(i % 4)); });
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
 }
 
 TEST(embree_of_the_host_is_not_called) {
@@ -277,13 +270,12 @@ TEST(embree_of_the_host_is_not_called) {
     mesh.indices = indices;
     mesh.vertex_count = 3;
     mesh.triangle_count = 1;
-    vsh_triangles *triangles = nullptr;
+    OWNED(vsh_triangles) *triangles = nullptr;
     vsh_error error{};
     const vsh_result result = vsh_triangles_create(&mesh, 1, nullptr, &triangles, &error);
     assert_string_equal(error.message, "");
     assert_int_equal(result, VSH_OK);
     assert_false(host_called);
-    vsh_triangles_free(triangles);
 }
 
 int make_folder(void **) {
@@ -317,6 +309,4 @@ int remove_folder(void **) {
 
 } // namespace
 
-int main() {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

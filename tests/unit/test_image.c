@@ -68,7 +68,7 @@ static double worst(const float *a, const float *b, size_t count) {
 TEST(exr_32_is_bit_exact) {
     static const int32_t sizes[][2] = {{37, 23}, {1, 1}, {1, 5000}, {5000, 1}, {16, 16}};
     for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
-        trip t;
+        FREED_BY(end) trip t;
         make(&t.s, sizes[k][0], sizes[k][1], 3, LIGHTMAP);
         t.s.values[0] = NAN;
         send(&t, "exact.exr", 0, "channels");
@@ -76,7 +76,6 @@ TEST(exr_32_is_bit_exact) {
         for (int32_t c = 0; c < 3; ++c) {
             assert_exact(&t, LIGHTMAP[c], c);
         }
-        end(&t);
     }
 }
 
@@ -90,7 +89,7 @@ TEST(exr_keeps_every_small_size) {
         const int32_t kind = at_size % KINDS, channels = at_size / KINDS % 7 + 1,
                       width = at_size / KINDS / 7 % LARGEST + 1, height = at_size / KINDS / 7 / LARGEST + 1;
         const int32_t bits = kind < 2 ? 32 : 16, variety = kind % 2 == 0 ? 2 : 7;
-        trip t;
+        FREED_BY(end) trip t;
         make(&t.s, width, height, channels, names);
         uint32_t seed = 7;
         for (int32_t i = 0; i < width * height * channels; ++i) {
@@ -106,7 +105,6 @@ TEST(exr_keeps_every_small_size) {
                          difference);
             }
         }
-        end(&t);
     }
 }
 
@@ -132,7 +130,7 @@ TEST(exr_channels_come_back_sorted_by_names_of_up_to_127_bytes) {
 }
 
 TEST(exr_16_is_right_to_half_precision) {
-    trip t;
+    FREED_BY(end) trip t;
     make(&t.s, 61, 50, 3, LIGHTMAP);
     send(&t, "half.exr", 16, NULL);
     double most = 0.0;
@@ -141,7 +139,6 @@ TEST(exr_16_is_right_to_half_precision) {
     }
     assert_true(most <= 0x1p-12); /* half has 11 bits: half a step below 1 is 2^-12 */
     assert_true(most > 0x1p-16);  /* and it was half, not float */
-    end(&t);
 }
 
 TEST(packs_name_the_channels_of_exr_which_may_have_commas_and_equals) {
@@ -178,13 +175,13 @@ TEST(every_format_keeps_values_to_half_a_step) {
         {"f.dpx", 32, 0.0, true},          {"f.hdr", 32, 1.0 / 128, false},  {"f.jpg", 8, 0.03, false},
         {"f.webp", 8, 0.06, false},        {"f.gif", 8, 0.3, false}, /* 256 colours */
     };
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 70, 90, 4, (const char *const[]){"shadow.sun", "ao", "shadow.lamp", "A"});
     for (int i = 0; i < 70 * 90; ++i) {
         s.values[3 * 70 * 90 + i] = (float)(i / 7 % 2); /* coverage */
     }
     for (size_t f = 0; f < sizeof formats / sizeof formats[0]; ++f) {
-        vsh_image_file *file = write_and_read(at(formats[f].name), &s.image, formats[f].bits, NULL);
+        OWNED(vsh_image_file) *file = write_and_read(at(formats[f].name), &s.image, formats[f].bits, NULL);
         const vsh_image view = vsh_image_view(file);
         assert_int_equal(view.width, 70);
         assert_int_equal(view.height, 90);
@@ -197,17 +194,15 @@ TEST(every_format_keeps_values_to_half_a_step) {
                          difference);
             }
         }
-        vsh_image_free(file);
     }
-    unmake(&s);
 }
 
 TEST(lossy_formats_keep_grey) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 70, 90, 2, (const char *const[]){"ao", "A"});
     static const char *const names[] = {"g.webp", "g.jpg"};
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
-        vsh_image_file *file = write_and_read(at(names[n]), &s.image, 0, NULL);
+        OWNED(vsh_image_file) *file = write_and_read(at(names[n]), &s.image, 0, NULL);
         const vsh_image view = vsh_image_view(file);
         for (int32_t c = 0; c < 3; ++c) {
             const double difference = worst(view.planes[c], s.planes[0], 70 * 90);
@@ -215,9 +210,7 @@ TEST(lossy_formats_keep_grey) {
                 fail_msg("%s, channel %d: off by %g", names[n], c, difference);
             }
         }
-        vsh_image_free(file);
     }
-    unmake(&s);
 }
 
 TEST(packs_and_formats_choose_the_file_s_channels_and_bits) {
@@ -234,7 +227,7 @@ TEST(packs_and_formats_choose_the_file_s_channels_and_bits) {
         {"zero.png", "G=ao", 8, 3, {-1, 1, -1}, 255},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        trip t;
+        FREED_BY(end) trip t;
         make(&t.s, 40, 30, 3, LIGHTMAP);
         float *const zeros = calloc(t.s.image.width * t.s.image.height, sizeof *zeros);
         send(&t, cases[i].name, cases[i].bits, cases[i].pack);
@@ -245,13 +238,12 @@ TEST(packs_and_formats_choose_the_file_s_channels_and_bits) {
             assert_true(off <= (from < 0 ? 0.0 : 0.5001 / cases[i].steps));
         }
         free(zeros);
-        end(&t);
     }
 }
 
 TEST(integers_clamp_and_turn_nan_to_0) {
     static const float expected[6] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.5f};
-    trip t;
+    FREED_BY(end) trip t;
     make(&t.s, 3, 2, 1, (const char *const[]){"ao"});
     memcpy(t.s.values, (const float[]){NAN, -1.0f, 2.0f, INFINITY, -INFINITY, 0.5f}, sizeof expected);
     send(&t, "clamp.png", 16, NULL);
@@ -259,7 +251,6 @@ TEST(integers_clamp_and_turn_nan_to_0) {
     for (int32_t c = 0; c < 3; ++c) {
         assert_true(worst(t.view.planes[c], expected, 6) <= 0.5001 / 65535);
     }
-    end(&t);
 }
 
 TEST(default_pack_takes_the_first_three_and_coverage) {
@@ -355,11 +346,11 @@ TEST(light_is_srgb_and_all_else_linear_unless_a_space_is_named) {
         {NULL, NULL, 16, VSH_COLOR_AUTO, 1, linear, "linear"},
         {vectors, NULL, 16, VSH_COLOR_AUTO, 1, half_and_half, NULL},
     };
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
     for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
         s.image.holds = cases[k].holds;
-        vsh_image_file *file =
+        OWNED(vsh_image_file) *file =
             write_as(at("color.png"), &s.image, cases[k].bits, cases[k].space, cases[k].pack);
         const vsh_image view = vsh_image_view(file);
         const double step = cases[k].bits == 8 ? 255.0 : 65535.0;
@@ -376,14 +367,12 @@ TEST(light_is_srgb_and_all_else_linear_unless_a_space_is_named) {
             assert_true(has_chunk(at("color.png"), "sRGB") == light);
             assert_false(!light && has_chunk(at("color.png"), "gAMA"));
         }
-        vsh_image_free(file);
     }
-    unmake(&s);
 }
 
 TEST(floats_are_linear_and_bad_spaces_are_refused) {
     static const int32_t none[] = {0, 0, 3, 0, 0};
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 30, 20, 5, IRRADIANCE);
     s.image.holds = HOLDS;
     vsh_image_file *file = write_as(at("float.tif"), &s.image, 32, VSH_COLOR_AUTO, NULL);
@@ -399,7 +388,6 @@ TEST(floats_are_linear_and_bad_spaces_are_refused) {
     s.image.holds = none;
     assert_fails(vsh_image_check(at("n.png"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "channel 'irradiance.G' holds 3, expected 0 … 2");
-    unmake(&s);
 }
 
 static vsh_image_clipping clipping_of(const char *path, const vsh_image *image, const char *pack) {
@@ -415,7 +403,7 @@ static vsh_image_clipping clipping_of(const char *path, const vsh_image *image, 
 }
 
 TEST(light_over_1_is_counted_where_it_is_cut) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 10, 10, 5, IRRADIANCE);
     s.image.holds = HOLDS;
     for (size_t i = 0; i < 100; ++i) {
@@ -433,9 +421,6 @@ TEST(light_over_1_is_counted_where_it_is_cut) {
     assert_int_equal(clipping_of(at("cut.exr"), &s.image, NULL).clipped, 0);
     assert_int_equal(clipping_of(at("cut.hdr"), &s.image, NULL).clipped, 0);
     assert_int_equal(clipping_of(at("cut.png"), &s.image, "R=shadow.sun,A=A").clipped, 0);
-    unmake(&s);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -22,10 +22,10 @@ typedef struct counts {
 
 /* Bakes meshes without voxels, and looks at each sample on a flat triangle anew. */
 static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
-    vsh_triangles *triangles = NULL;
-    vsh_occluders *occluders = NULL;
-    vsh_charts *charts = NULL;
-    vsh_texels *texels = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
+    OWNED(vsh_charts) *charts = NULL;
+    OWNED(vsh_texels) *texels = NULL;
     check(vsh_triangles_create(meshes, mesh_count, NULL, &triangles, &failure), &failure);
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
@@ -40,7 +40,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
     check(vsh_texels_create(charts, NULL, &texels, &failure), &failure);
     const vshi_samples *samples = &texels->samples;
     const size_t count = (size_t)size * (size_t)size;
-    float *ao = calloc(count, sizeof *ao), *coverage = calloc(count, sizeof *coverage);
+    FREED float *ao = calloc(count, sizeof *ao), *coverage = calloc(count, sizeof *coverage);
     const vsh_lightmap lightmap = {.ao = ao, .coverage = coverage};
     check(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &failure), &failure);
     counts found = {0, 0, 0};
@@ -57,12 +57,6 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
         found.invalid += where != VSHI_OUTSIDE;
         found.other += valid != (where == VSHI_OUTSIDE);
     }
-    free(coverage);
-    free(ao);
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
-    vsh_occluders_free(occluders);
-    vsh_triangles_free(triangles);
     return found;
 }
 
@@ -71,7 +65,7 @@ TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
     OWNED(vsh_model) *model = NULL;
     check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure), &failure);
     const size_t mesh_count = vsh_model_mesh_count(model);
-    vsh_mesh *meshes = calloc(mesh_count, sizeof *meshes);
+    FREED vsh_mesh *meshes = calloc(mesh_count, sizeof *meshes);
     for (size_t i = 0; i < mesh_count; ++i) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
@@ -80,7 +74,6 @@ TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
                   found.other);
     assert_true(found.samples > 100000 && found.invalid > 10000);
     assert_int_equal(found.other, 0);
-    free(meshes);
 }
 
 enum { RINGS = 24, SECTORS = 32, BALLS = 2, QUADS = BALLS * RINGS * SECTORS };
@@ -120,7 +113,7 @@ static void add_ball(head *h, double radius, double z, double hole, float left) 
 
 /* A head with a hole, and an eye that looks out of it: how many rays find their way grows over the eye. */
 TEST(samples_beside_a_hole_are_where_they_are_by_themselves) {
-    head *h = calloc(1, sizeof *h);
+    FREED head *h = calloc(1, sizeof *h);
     add_ball(h, 1.0, 0.0, 0.35, 0.0f);
     add_ball(h, 0.4, 0.5, 0.0, 0.5f);
     const vsh_mesh mesh = {.name = "head",
@@ -134,7 +127,6 @@ TEST(samples_beside_a_hole_are_where_they_are_by_themselves) {
                   found.other);
     assert_true(found.samples > 100000 && found.invalid > 10000 && found.invalid < found.samples / 2);
     assert_int_equal(found.other, 0);
-    free(h);
 }
 
 /* A hood, which is a box without its bottom, over a floor. Points deep below it see its inner sides alone,
@@ -160,8 +152,4 @@ TEST(samples_below_a_hood_are_where_they_are_by_themselves) {
     const double side = 2.0 - 2.0 * 0.04 / 0.06, square = side * side / 16.0 * (double)found.samples;
     assert_true((double)found.invalid >= 0.99 * square && (double)found.invalid < 1.3 * square);
     assert_int_equal(found.other, 0);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -153,7 +153,3 @@ TEST(what_has_no_place_or_normal_adds_nothing) {
     const vsh_points none = {0, NULL, NULL, NULL};
     vsh_shade_irradiance(&none, NULL, &light, NULL, NULL);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}
