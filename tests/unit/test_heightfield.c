@@ -31,9 +31,7 @@ TEST(a_solid_is_closed_wound_outwards_and_of_its_volume) {
     double volume = 0.0, lowest = INFINITY;
     for (size_t t = 0; t < mesh.triangle_count; ++t) {
         vshi_vec c[3];
-        for (int k = 0; k < 3; ++k) {
-            c[k] = vshi_vec_off(mesh.positions + 3 * mesh.indices[3 * t + (size_t)k]);
-        }
+        vshi_mesh_triangle(&mesh, t, c);
         volume += vshi_dot(c[0], vshi_cross(c[1], c[2])) / 6.0;
     }
     /* prisms over the two triangles of each cell */
@@ -331,14 +329,19 @@ TEST(every_instruction_set_finds_the_same_crossings) {
     assert_true(crossed > 500);
 }
 
-/* A scene of one heightfield caster over an image in the tests' folder. */
-static vsh_result load(const char *path, vsh_assets **assets, vsh_error *error) {
+static vsh_caster caster_of(const char *path, double width, double depth, double height) {
     vsh_caster caster = vsh_caster_default();
     caster.type = VSH_CASTER_HEIGHTFIELD;
     caster.path = path;
-    caster.size[0] = 3.0;
-    caster.size[1] = 2.0;
-    caster.height = 4.0;
+    caster.size[0] = width;
+    caster.size[1] = depth;
+    caster.height = height;
+    return caster;
+}
+
+/* A scene of one heightfield caster over an image in the tests' folder. */
+static vsh_result load(const char *path, vsh_assets **assets, vsh_error *error) {
+    vsh_caster caster = caster_of(path, 3.0, 2.0, 4.0);
     vsh_scene scene = vsh_scene_default();
     scene.casters = &caster;
     scene.caster_count = 1;
@@ -354,24 +357,9 @@ static float smooth_hill(int number, int column, int row) {
                       (wide * wide));
 }
 
-/* Middles of the top's triangles, a little above them, and their normals. */
-static size_t stand_on_top(const vsh_mesh *mesh, size_t step, double *positions, float *normals) {
-    size_t count = 0;
-    for (size_t i = 0; i < 2 * (size_t)(SIDE - 1) * (SIDE - 1); i += step, ++count) {
-        vshi_vec c[3];
-        vshi_mesh_triangle(mesh, i, c);
-        const vshi_vec n = vshi_unit(vshi_cross(vshi_sub(c[1], c[0]), vshi_sub(c[2], c[0])));
-        const vshi_vec p =
-            vshi_add(vshi_scale(vshi_add(vshi_add(c[0], c[1]), c[2]), 1.0 / 3.0), vshi_scale(n, 1e-4));
-        memcpy(positions + 3 * count, (const double[]){p.x, p.y, p.z}, sizeof(double[3]));
-        memcpy(normals + 3 * count, (const float[]){(float)n.x, (float)n.y, (float)n.z}, sizeof(float[3]));
-    }
-    return count;
-}
-
 /* `direct` had dark lumps on the flanks. */
 TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
-    enum { POINTS = 2 * (SIDE - 1) * (SIDE - 1), RAYS = 256 };
+    enum { FACES = 2 * (SIDE - 1) * (SIDE - 1), POINTS = FACES / 3 + 1, RAYS = 256 };
     static float values[SIDE * SIDE], normals[3 * POINTS], shadow[POINTS], ao[POINTS], truth[2][POINTS];
     static double positions[3 * POINTS];
     static const double towards[3] = {-1.0, 0.5, 0.0};
@@ -389,14 +377,13 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
         const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
         OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-        const vsh_points points = {stand_on_top(&mesh, 3, positions, normals), positions, normals, NULL};
+        vsh_points points = {0, positions, normals, NULL};
+        for (size_t i = 0; i < FACES; i += 3, ++points.count) {
+            stand_on(&mesh, i, 1.0 / 3.0, 1.0 / 3.0, points.count, positions, normals);
+        }
         truth_mesh *rays = truth_mesh_create(&mesh, 1);
         for (int direct = 0; rays != NULL && direct < 2; ++direct) {
-            vsh_caster caster = vsh_caster_default();
-            caster.type = VSH_CASTER_HEIGHTFIELD;
-            caster.path = at("hill.exr");
-            caster.size[0] = caster.size[1] = 10.0;
-            caster.height = 2.0;
+            vsh_caster caster = caster_of(at("hill.exr"), 10.0, 10.0, 2.0);
             caster.direct = direct;
             vsh_scene scene = vsh_scene_default();
             scene.casters = &caster;
@@ -497,21 +484,20 @@ TEST(bad_sources_are_refused) {
         double size[2], height, base;
         const float *values;
         const double *transform;
-        vsh_result code;
         const char *message;
     } cases[] = {
-        {1, 2, {1, 1}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "columns 1 is out of range 2 … 65536"},
-        {-4, 2, {1, 1}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "columns -4 is out of range"},
-        {0, 0, {1, 1}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "columns 0 is out of range"},
-        {2, INT32_MAX, {1, 1}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "rows 2.14748e+09 is out of range"},
-        {2, 2, {0, 1}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "size[0] 0 is out of range"},
-        {2, 2, {1, NAN}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "size[1] nan is out of range"},
-        {2, 2, {1e13, 1}, 1, 1, values, NULL, VSH_ERROR_ARGUMENT, "size[0] 1e+13 is out of range"},
-        {2, 2, {1, 1}, INFINITY, 1, values, NULL, VSH_ERROR_ARGUMENT, "height inf is out of range"},
-        {2, 2, {1, 1}, 1, -1, values, NULL, VSH_ERROR_ARGUMENT, "base -1 is out of range"},
-        {2, 2, {1, 1}, 1, 1, nan, NULL, VSH_ERROR_INPUT, "row 1, column 0: value nan"},
-        {2, 2, {1, 1}, 1, 1, NULL, NULL, VSH_ERROR_ARGUMENT, "values is NULL"},
-        {2, 2, {1, 1}, 1, 1, values, shear, VSH_ERROR_ARGUMENT, "transform must be finite and neither shear"},
+        {1, 2, {1, 1}, 1, 1, values, NULL, "columns 1 is out of range 2 … 65536"},
+        {-4, 2, {1, 1}, 1, 1, values, NULL, "columns -4 is out of range"},
+        {0, 0, {1, 1}, 1, 1, values, NULL, "columns 0 is out of range"},
+        {2, INT32_MAX, {1, 1}, 1, 1, values, NULL, "rows 2.14748e+09 is out of range"},
+        {2, 2, {0, 1}, 1, 1, values, NULL, "size[0] 0 is out of range"},
+        {2, 2, {1, NAN}, 1, 1, values, NULL, "size[1] nan is out of range"},
+        {2, 2, {1e13, 1}, 1, 1, values, NULL, "size[0] 1e+13 is out of range"},
+        {2, 2, {1, 1}, INFINITY, 1, values, NULL, "height inf is out of range"},
+        {2, 2, {1, 1}, 1, -1, values, NULL, "base -1 is out of range"},
+        {2, 2, {1, 1}, 1, 1, nan, NULL, "row 1, column 0: value nan"},
+        {2, 2, {1, 1}, 1, 1, NULL, NULL, "values is NULL"},
+        {2, 2, {1, 1}, 1, 1, values, shear, "transform must be finite and neither shear"},
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         const vsh_heights_source source = {.columns = cases[i].columns,
@@ -521,13 +507,14 @@ TEST(bad_sources_are_refused) {
                                            .height = cases[i].height,
                                            .base = cases[i].base,
                                            .transform = cases[i].transform};
+        const vsh_result code = source.values == nan ? VSH_ERROR_INPUT : VSH_ERROR_ARGUMENT;
         vsh_heights *heights = NULL;
         vsh_model *model = NULL;
-        assert_fails(vsh_heights_create(&source, NULL, &heights, &failure), cases[i].code, cases[i].message);
+        assert_fails(vsh_heights_create(&source, NULL, &heights, &failure), code, cases[i].message);
         assert_null(heights);
         if (cases[i].transform == NULL) { /* a mesh may be sheared */
-            assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure),
-                         cases[i].code, "");
+            assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure), code,
+                         "");
             assert_null(model);
         }
     }
