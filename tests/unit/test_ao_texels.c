@@ -71,25 +71,10 @@ static int tear_down(void **state) {
     return 0;
 }
 
-/* Planes beside AO, its error and bent normals, or not with them. */
-enum { WITH_SKY = 1, TANGENT_SPACE = 2, WITHOUT_AO = 4, WITHOUT_BENT = 8 };
-
 typedef struct baked {
-    float ao[TEXELS], error[TEXELS], bent[3 * TEXELS], sky[TEXELS], coverage[TEXELS];
+    float ao[TEXELS], error[TEXELS], bent[3 * TEXELS], coverage[TEXELS];
     vsh_shade_stats stats;
-    uint32_t planes;
 } baked;
-
-static vsh_lightmap planes_of(baked *b) {
-    const bool ao = (b->planes & WITHOUT_AO) == 0, tangent = (b->planes & TANGENT_SPACE) != 0;
-    return (vsh_lightmap){.ao = ao ? b->ao : NULL,
-                          .ao_error = ao ? b->error : NULL,
-                          .bent = (b->planes & WITHOUT_BENT) == 0 ? b->bent : NULL,
-                          .bent_space = tangent ? VSH_BENT_TANGENT : VSH_BENT_WORLD,
-                          .sky = (b->planes & WITH_SKY) != 0 ? b->sky : NULL,
-                          .asked = {.sky = VSH_UP_Y},
-                          .coverage = b->coverage};
-}
 
 typedef struct how {
     int32_t spacing;
@@ -97,37 +82,24 @@ typedef struct how {
     int32_t padding;
     int32_t threads;
     size_t receivers; /* of the first so many; 0: all */
-    uint32_t planes;
-    bool marched; /* by VSH_AO_ADAPTIVE */
+    bool marched;     /* by VSH_AO_ADAPTIVE */
 } how;
 
-static baked *begin_baked(uint32_t planes) {
-    baked *b = malloc(sizeof *b);
-    assert_non_null(b);
-    memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
-    b->stats = vsh_shade_stats_zero();
-    b->planes = planes;
-    return b;
-}
-
-static vsh_lightmap_options options_of(how h) {
+static baked *bake(const stage *s, how h) {
     vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
     options.padding = h.padding;
-    options.tangents = 1;
     options.ao_spacing = h.spacing;
     options.shade.ao_method = h.marched ? VSH_AO_ADAPTIVE : VSH_AO_EXACT;
     options.shade.ao_distance = 0.8;
     options.shade.rays = 0; /* as many as the error takes */
     options.shade.max_error = h.max_error;
-    return options;
-}
-
-static baked *bake(const stage *s, how h) {
-    const vsh_lightmap_options options = options_of(h);
-    const size_t receivers = h.receivers == 0 ? RECEIVERS : h.receivers;
-    baked *b = begin_baked(h.planes);
-    OWNED(vsh_charts) *charts = create(s->receivers, receivers, options, NULL);
-    const vsh_lightmap lightmap = planes_of(b);
+    baked *b = malloc(sizeof *b);
+    assert_non_null(b);
+    memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
+    OWNED(vsh_charts) *charts =
+        create(s->receivers, h.receivers == 0 ? RECEIVERS : h.receivers, options, NULL);
+    const vsh_lightmap lightmap = {
+        .ao = b->ao, .ao_error = b->error, .bent = b->bent, .coverage = b->coverage};
     const vsh_run run = run_on(h.threads);
     vsh_bake_stats stats = vsh_bake_stats_zero();
     assert_ok(vsh_bake_lightmap(occluders_of_caster(&s->casters), charts, NULL, 0, &options.shade, &run,
@@ -136,37 +108,12 @@ static baked *bake(const stage *s, how h) {
     return b;
 }
 
-static void assert_same_plane(const char *name, const float *a, const float *b, size_t floats) {
-    for (size_t i = 0; i < floats * TEXELS; ++i) {
-        if (memcmp(&a[i], &b[i], sizeof a[i]) != 0) {
-            fail_msg("%s, row %zu, column %zu: %.9g, then %.9g", name, i / floats / WIDTH, i / floats % WIDTH,
-                     (double)a[i], (double)b[i]);
-        }
-    }
-}
-
-static void assert_same(const baked *a, const baked *b) {
-    const uint32_t without = a->planes | b->planes, with = a->planes & b->planes;
-    assert_same_plane("coverage", a->coverage, b->coverage, 1);
-    if ((without & WITHOUT_AO) == 0) {
-        assert_same_plane("ao", a->ao, b->ao, 1);
-        assert_same_plane("ao_error", a->error, b->error, 1);
-    }
-    if ((without & WITHOUT_BENT) == 0) {
-        assert_same_plane("bent", a->bent, b->bent, 3);
-    }
-    if ((with & WITH_SKY) != 0) {
-        assert_same_plane("sky", a->sky, b->sky, 1);
-    }
-    assert_memory_equal(&a->stats, &b->stats, sizeof a->stats);
-}
-
 TEST(threads_change_no_bit) {
     FREED baked *one = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = 1});
     for (int32_t threads = 2; threads <= 8; ++threads) {
         FREED baked *more =
             bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = threads});
-        assert_same(one, more);
+        assert_memory_equal(one, more, sizeof *one);
     }
 }
 

@@ -1,61 +1,6 @@
-/* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(), and the tree that it asks. */
+/* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(). */
 #include "seams.h"
 #include "testing.h"
-
-#include "bake/places.h"
-
-/* --- the tree */
-
-static uint32_t nearest_of_all(const vshi_place *list, size_t count, const float at[3], float most) {
-    uint32_t best = UINT32_MAX;
-    for (size_t i = 0; i < count; ++i) {
-        float square = 0;
-        for (int k = 0; k < 3; ++k) {
-            square += (list[i].at[k] - at[k]) * (list[i].at[k] - at[k]);
-        }
-        if (square < most || (square == most && best != UINT32_MAX && list[i].number < best)) {
-            most = square;
-            best = list[i].number;
-        }
-    }
-    return best;
-}
-
-/* Places anywhere, on a plane, on a coarse lattice (many at one place), and all at one. */
-TEST(the_tree_finds_what_a_look_at_all_finds) {
-    enum { MOST = 1500 };
-    uint32_t seed = 5;
-    for (int kind = 0; kind < 4; ++kind) {
-        for (size_t count = 1; count <= MOST; count = count < 20 ? count + 1 : 5 * count) {
-            FREED_BY(vshi_places_free) vshi_places places = {calloc(count, sizeof(vshi_place)), NULL, count};
-            FREED vshi_place *list = calloc(count, sizeof *list);
-            for (size_t i = 0; i < count; ++i) {
-                for (int k = 0; k < 3; ++k) {
-                    const float x = random_value(&seed);
-                    list[i].at[k] = kind == 3             ? 1.0F
-                                    : kind == 2           ? floorf(5 * x)
-                                    : kind == 1 && k == 2 ? 0.0F
-                                                          : x;
-                }
-                list[i].number = (uint32_t)(count - i); /* not in the order of the list */
-            }
-            memcpy(places.list, list, count * sizeof *list);
-            assert_int_equal(vshi_places_sort(&places, NULL), VSH_OK);
-            for (int i = 0; i < 200; ++i) {
-                float at[3];
-                for (int k = 0; k < 3; ++k) {
-                    at[k] =
-                        kind == 2 ? floorf(11 * random_value(&seed)) / 2 : 1.4F * random_value(&seed) - 0.2F;
-                }
-                const float most = i % 2 ? INFINITY : 0.02F;
-                assert_int_equal(vshi_places_nearest(&places, at, most),
-                                 nearest_of_all(list, count, at, most));
-            }
-        }
-    }
-}
-
-/* --- lightmaps */
 
 /* Three squares of the plane z = 0 in a row, each a chart of 12 texels: the middle one is hidden. Beside the
  * first, in the lightmap, stands a fourth that is far away in the world. */

@@ -129,18 +129,6 @@ TEST(exr_channels_come_back_sorted_by_names_of_up_to_127_bytes) {
     end(&t);
 }
 
-TEST(exr_16_is_right_to_half_precision) {
-    FREED_BY(end) trip t;
-    make(&t.s, 61, 50, 3, LIGHTMAP);
-    send(&t, "half.exr", 16, NULL);
-    double most = 0.0;
-    for (int32_t c = 0; c < 3; ++c) {
-        most = fmax(most, worst(t.view.planes[channel_of(&t.view, LIGHTMAP[c])], t.s.planes[c], t.texels));
-    }
-    assert_true(most <= 0x1p-12); /* half has 11 bits: half a step below 1 is 2^-12 */
-    assert_true(most > 0x1p-16);  /* and it was half, not float */
-}
-
 TEST(packs_name_the_channels_of_exr_which_may_have_commas_and_equals) {
     trip t;
     make(&t.s, 6, 20, 3, LIGHTMAP);
@@ -241,18 +229,6 @@ TEST(packs_and_formats_choose_the_file_s_channels_and_bits) {
     }
 }
 
-TEST(integers_clamp_and_turn_nan_to_0) {
-    static const float expected[6] = {0.0f, 0.0f, 1.0f, 1.0f, 0.0f, 0.5f};
-    FREED_BY(end) trip t;
-    make(&t.s, 3, 2, 1, (const char *const[]){"ao"});
-    memcpy(t.s.values, (const float[]){NAN, -1.0f, 2.0f, INFINITY, -INFINITY, 0.5f}, sizeof expected);
-    send(&t, "clamp.png", 16, NULL);
-    assert_int_equal(t.view.channel_count, 3); /* one channel is grey: the same in R, G and B */
-    for (int32_t c = 0; c < 3; ++c) {
-        assert_true(worst(t.view.planes[c], expected, 6) <= 0.5001 / 65535);
-    }
-}
-
 TEST(default_pack_takes_the_first_three_and_coverage) {
     static const struct {
         int32_t count;
@@ -296,19 +272,6 @@ static const char *said(const vsh_image_file *file) {
         }
     }
     return "";
-}
-
-static bool has_chunk(const char *path, const char *type) {
-    unsigned char *bytes = NULL;
-    const size_t size = read_all(path, &bytes);
-    bool found = false;
-    for (size_t at = 8; at + 12 <= size && !found;) {
-        found = memcmp(bytes + at + 4, type, 4) == 0;
-        at += 12 + ((size_t)bytes[at] << 24 | (size_t)bytes[at + 1] << 16 | (size_t)bytes[at + 2] << 8 |
-                    bytes[at + 3]);
-    }
-    free(bytes);
-    return found;
 }
 
 /* IEC 61966-2-1, by libm. */
@@ -362,10 +325,7 @@ TEST(light_is_srgb_and_all_else_linear_unless_a_space_is_named) {
             assert_true(fabs((double)(view.planes[3][i] - s.planes[4][i])) <= 0.501 / step);
         }
         if (cases[k].said != NULL) {
-            const bool light = strcmp(cases[k].said, "sRGB") == 0;
             assert_string_equal(said(file), cases[k].said);
-            assert_true(has_chunk(at("color.png"), "sRGB") == light);
-            assert_false(!light && has_chunk(at("color.png"), "gAMA"));
         }
     }
 }
