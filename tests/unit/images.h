@@ -86,6 +86,17 @@ static inline void write_all(const char *path, const unsigned char *bytes, size_
     assert_int_equal(fclose(file), 0);
 }
 
+static inline int entries_in_folder(void) {
+    DIR *directory = opendir(folder);
+    assert_non_null(directory);
+    int count = 0;
+    while (readdir(directory) != NULL) {
+        ++count;
+    }
+    closedir(directory);
+    return count;
+}
+
 static inline int make_folder(void **state) {
     (void)state;
     char here[200];

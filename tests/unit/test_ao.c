@@ -200,7 +200,6 @@ TEST(under_a_sphere_ao_is_near_the_truth) {
                 }
             }
         }
-        print_message("sphere at %g: 16 cones worst %.4f, 64 cones %.4f\n", heights[i], worst[0], worst[1]);
         assert_true(worst[0] < 0.06 && worst[1] < 0.06);
     }
 }
@@ -215,10 +214,10 @@ TEST(what_is_beyond_the_distance_hides_nothing) {
     for (int32_t cones = 1; cones <= 64; cones *= 2) {
         const double sine = fmin(sqrt(0.5), sqrt(1.0 - (1.0 - 1.0 / cones) * (1.0 - 1.0 / cones)));
         assert_true(ao_at(field, cones, 0.95 / (1.0 + sine), p) == 1.0);
-        assert_true(ao_at(field, cones, 3.0, p) < 0.5);
+        assert_less(ao_at(field, cones, 3.0, p), 0.5);
     }
     assert_true(ao_at(field, 0, 0.4, p) == 1.0);
-    assert_true(ao_at(field, 0, 1.0, p) < 1.0);
+    assert_less(ao_at(field, 0, 1.0, p), 1.0);
 }
 
 /* Means over a room's floor, and the brightest point of it. No cone finds a wall deep that is thinner than it
@@ -242,8 +241,6 @@ TEST(a_closed_room_is_dark) {
                 mean += 0.005 * ao;
                 brightest = fmax(brightest, ao);
             }
-            print_message("walls of %g, %d cones: %.4f, at most %.4f\n", cases[i].wall, fine ? 64 : 16, mean,
-                          brightest);
             assert_true(mean < cases[i].mean[fine] && brightest < cases[i].brightest[fine]);
         }
     }
@@ -258,7 +255,6 @@ TEST(on_the_seeds_floor_cones_are_near_the_truth) {
         options.ao_cones = cones[n];
         shade_seeds(&options, ao, NULL);
         const truth_metrics m = truth_compare(TEXELS, ao, seeds()->p.truth, NULL);
-        print_message("%d cones: RMSE %.4f, bias %+.4f\n", cones[n], m.rmse, m.bias);
         assert_true(m.rmse < bounds[n][0] && fabs(m.bias) < bounds[n][1]);
     }
 }
@@ -276,8 +272,7 @@ TEST(farther_distances_hide_more) {
             last = ao;
         }
     }
-    print_message("AO rises by %.5f at most\n", rise);
-    assert_true(rise <= 3e-3); /* samples of a longer cone fall elsewhere */
+    assert_at_most(rise, 3e-3); /* samples of a longer cone fall elsewhere */
 }
 
 /* --- rays */
@@ -308,9 +303,7 @@ TEST(more_rays_come_nearer_to_the_truth) {
             options.sampler = sampler;
             shade_seeds(&options, ao, NULL);
             const truth_metrics m = truth_compare(TEXELS, ao, seeds()->p.truth, NULL);
-            print_message("%s, %d rays: RMSE %.4f, bias %+.4f\n", vsh_get_name(VSH_NAMES_SAMPLER, sampler),
-                          options.rays, m.rmse, m.bias);
-            assert_true(m.rmse < bounds[sampler][step]);
+            assert_less(m.rmse, bounds[sampler][step]);
             /* best candidates crowd the disc's rim */
             assert_true(fabs(m.bias) < (sampler == VSH_SAMPLER_BLUE ? 0.025 : 0.004));
         }
@@ -334,8 +327,6 @@ TEST(frames_may_be_averaged) {
             }
         }
         const double averaged = truth_compare(TEXELS, mean, seeds()->p.truth, NULL).rmse;
-        print_message("%s: one frame %.4f, four %.4f\n", vsh_get_name(VSH_NAMES_SAMPLER, sampler), single,
-                      averaged);
         /* a turned copy of the same points is less than another set */
         assert_true(averaged < (sampler == VSH_SAMPLER_BLUE ? 0.9 : 0.6) * single);
     }
@@ -347,8 +338,8 @@ TEST(rays_that_agree_early_end_a_point) {
     const vsh_shade_stats full = shade_seeds(&options, all, NULL);
     options.early_rays = 16;
     const vsh_shade_stats less = shade_seeds(&options, early, NULL);
-    assert_true(less.marches < full.marches);
-    assert_true(fabs(truth_compare(TEXELS, early, all, NULL).bias) < 0.006);
+    assert_less(less.marches, full.marches);
+    assert_less(fabs(truth_compare(TEXELS, early, all, NULL).bias), 0.006);
     for (size_t i = 0; i < TEXELS; ++i) {
         /* what has not agreed takes them all, and the same */
         assert_true(early[i] == all[i] || early[i] == 0.0f || early[i] == 1.0f);
@@ -376,8 +367,7 @@ TEST(edges_hide_as_much_as_their_casters) {
     const vsh_shade_options options = options_of(VSH_AO_RAYS, 1024, 1.0);
     shade(occluders_of(field), &options, COUNT, positions, normals, open, NULL);
     const truth_metrics m = truth_compare(COUNT, open, expected, NULL);
-    print_message("slats of 3.3 voxels: rmse %.4f, bias %+.4f\n", m.rmse, m.bias);
-    assert_true(fabs(m.bias) < 0.01);
+    assert_less(fabs(m.bias), 0.01);
 }
 
 /* --- rays until an error is reached */
@@ -395,12 +385,9 @@ static vsh_shade_stats shade_until(const vsh_occluders *casters, const places *p
                     (double)deviation[i] <= options->max_error * 1.000001);
         said += (double)deviation[i] * (double)deviation[i];
     }
-    print_message("%s, asked %g: said %.4f, is %.4f, bias %+.4f\n",
-                  vsh_get_name(VSH_NAMES_SAMPLER, options->sampler), options->max_error, sqrt(said / TEXELS),
-                  m.rmse, m.bias);
     assert_true(m.rmse <= 1.1 * sqrt(said / TEXELS) && sqrt(said / TEXELS) <= options->max_error);
     assert_true(fabs(m.bias) < (options->sampler == VSH_SAMPLER_BLUE ? 0.5 : 0.25) * options->max_error);
-    assert_true(fabs(stats.square_error - said) < 1e-4 * said + 1e-9);
+    assert_less(fabs(stats.square_error - said), 1e-4 * said + 1e-9);
     return stats;
 }
 

@@ -8,6 +8,10 @@ static double wavy(const void *user, double x, double y, double z) {
     return 0.5 + 0.3 * sin(0.4 * x) * cos(0.3 * y) + 0.1 * noise((uint32_t)(y * WIDTH + x));
 }
 
+static plane waves(void) {
+    return make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+}
+
 TEST(differences_are_summed_as_their_formulas_say) {
     const double half = 0.5;
     FREED_BY(free_plane)
@@ -93,7 +97,7 @@ TEST(a_value_that_is_not_finite_never_passes) {
 }
 
 TEST(nothing_compared_is_nothing_held) {
-    FREED_BY(free_plane) plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    FREED_BY(free_plane) plane golden = waves();
     uint8_t mask[COUNT] = {0};
     const vsh_measures m = measure(&golden, &golden, mask);
     const vsh_limits limits = vsh_limits_default();
@@ -166,7 +170,7 @@ static int32_t stop(void *user, const char *stage, double fraction) {
 }
 
 TEST(bad_calls_are_refused_by_name) {
-    FREED_BY(free_plane) plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    FREED_BY(free_plane) plane golden = waves();
     const vsh_compared good = pair_of(&golden, &golden, NULL);
     vsh_measures m;
     const struct {
@@ -189,13 +193,10 @@ TEST(bad_calls_are_refused_by_name) {
     }
     assert_int_equal(vsh_compare(NULL, NULL, NULL, &m, NULL), VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_compare(&good, NULL, NULL, NULL, NULL), VSH_ERROR_ARGUMENT);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = COUNT * 20;
+    vsh_run run = run_within(COUNT * 20);
     assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_LIMIT);
     int asked = 0;
-    run = vsh_run_default();
-    run.progress = stop;
-    run.user = &asked;
+    run = run_watched(stop, &asked);
     assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_CANCELLED);
     assert_int_equal(asked, 1);
 }

@@ -128,9 +128,6 @@ TEST(what_voxels_lose_is_in_the_estimate) {
     for (int c = 0; c < CHANNELS; ++c) {
         const vsh_bake_error *known = &b->errors[c];
         const double said = vsh_bake_error_rmse(known), field = vsh_bake_error_field(known);
-        print_message("%s: measured %.4f, said %.4f, the field's %.4f, by rays alone %.4f\n",
-                      c == 0 ? "shadow" : "ao", measured[c], said, field,
-                      sqrt(known->square_error / known->values));
         assert_true(measured[c] > 0.02);
         assert_true(said > 0.9 * measured[c] && said < 1.1 * measured[c]);
         assert_true(fabs(field * field + known->square_error / known->values - said * said) < 1e-9);
@@ -148,7 +145,6 @@ TEST(exact_values_are_held_against_rays_too) {
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
         const double said = vsh_bake_error_rmse(&b->errors[c]);
-        print_message("measured %.4f, said %.4f\n", measured[c], said);
         assert_true(said < 0.03 && said > 0.9 * measured[c]);
     }
 }
@@ -199,8 +195,6 @@ TEST(filled_texels_are_not_in_the_estimate) {
     for (int c = 0; c < CHANNELS; ++c) {
         const double said = vsh_bake_error_rmse(&b->errors[c]);
         const double held = sqrt(b->errors[c].held_square_error / b->errors[c].held);
-        print_message("%g valid, %g held; measured %.4f, held %.4f, said %.4f\n", b->errors[c].values,
-                      b->errors[c].held, measured[c], held, said);
         /* one sample stands for several, of which some may be invalid */
         assert_true(b->errors[c].values < 0.9 * TEXELS);
         assert_true(fabs(b->errors[c].held - b->errors[c].values) < 0.01 * b->errors[c].values);

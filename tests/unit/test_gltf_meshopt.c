@@ -311,8 +311,7 @@ TEST(what_is_unpacked_is_held_against_the_limit) {
     pack_sheet(true, 2);
     const char *json = packed_json();
     write_bytes("a.gltf", json, strlen(json));
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 6 * strlen(json) + 1000;
+    vsh_run run = run_within(6 * strlen(json) + 1000);
     vsh_model *model;
     assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);

@@ -48,7 +48,7 @@ TEST(a_solid_is_closed_wound_outwards_and_of_its_volume) {
             expected += dx * dz * (0.5 * 2.0 * (right + left) - (lowest - 0.5));
         }
     }
-    assert_true(fabs(volume - expected) < 1e-4 * expected);
+    assert_less(fabs(volume - expected), 1e-4 * expected);
 }
 
 TEST(a_surface_lies_under_its_lightmap_as_the_image_does) {
@@ -97,7 +97,7 @@ TEST(a_surface_keeps_the_heights_beside_each_texel_s_middle) {
                 ++next;
             }
             /* one cell of the heights is all that lies between */
-            assert_true((double)(mesh.uvs[2 * next] - mesh.uvs[2 * next - 2]) * (SIDE - 1) < 1.001);
+            assert_less((double)(mesh.uvs[2 * next] - mesh.uvs[2 * next - 2]) * (SIDE - 1), 1.001);
         }
     }
 }
@@ -141,8 +141,7 @@ TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
         .columns = SIDE, .rows = 5, .values = values, .size = {4, 4}, .height = 8, .base = 1};
     OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.05;
+    vsh_grid_options options = with_voxel(0.05);
     options.half_width = 8.0;
     vsh_grid *grid = NULL;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
@@ -251,7 +250,7 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
         mesh.transform = transforms[i];
         const vsh_mesh other = reindexed(&mesh, indices);
         OWNED(vsh_triangles) *terrain = make_triangles(&mesh), *triangles = make_triangles(&other);
-        assert_true(vsh_triangles_bytes(terrain) < vsh_triangles_bytes(triangles) / 4);
+        assert_less(vsh_triangles_bytes(terrain), vsh_triangles_bytes(triangles) / 4);
         uint32_t seed = (uint32_t)i;
         int apart[4] = {0};
         for (int k = 0; k < RAYS; ++k) {
@@ -273,10 +272,8 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
                 assert_true(fabs(near / vshi_triangles_distance(triangles, &ray) - 1.0) < 1e-2);
             }
         }
-        print_message("transform %zu: of %d rays %d, %d, %d and %d differ\n", i, RAYS, apart[0], apart[1],
-                      apart[2], apart[3]);
         for (int k = 0; k < 4; ++k) { /* rays that graze an edge */
-            assert_true(apart[k] < RAYS / 1000);
+            assert_less(apart[k], RAYS / 1000);
         }
     }
 }
@@ -407,8 +404,7 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
                 worst = fmax(worst, fabs((double)shadow[i] - (double)truth[0][i]));
                 worst = fmax(worst, fabs((double)ao[i] - (double)truth[1][i]));
             }
-            print_message("hill %d%s: worst %.3f\n", hill, direct ? ", direct" : "", worst);
-            assert_true(worst < 0.1);
+            assert_less(worst, 0.1);
         }
         truth_mesh_free(rays);
     }
@@ -523,8 +519,7 @@ TEST(bad_sources_are_refused) {
 TEST(memory_limits_hold_before_memory_is_taken) {
     FREED float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 3 * SIDE * SIDE;
+    vsh_run run = run_within(3 * SIDE * SIDE);
     OWNED(vsh_heights) *heights = NULL;
     vsh_model *model = NULL;
     assert_fails(vsh_heights_create(&source, &run, &heights, &failure), VSH_ERROR_LIMIT, "");
@@ -534,7 +529,7 @@ TEST(memory_limits_hold_before_memory_is_taken) {
     assert_ok(vsh_heights_create(&source, &run, &heights, &failure));
     vsh_heights_info info;
     vsh_heights_get_info(heights, &info);
-    assert_true(info.bytes <= run.memory_limit);
+    assert_at_most(info.bytes, run.memory_limit);
 }
 
 FIXTURE(make_folder, remove_folder)

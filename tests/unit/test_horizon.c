@@ -97,9 +97,8 @@ TEST(shares_of_what_is_over_a_horizon_are_the_rays) {
                 square += off * off / POINTS;
                 mean += off / POINTS;
             }
-            print_message("method %d: rmse %.4f, bias %.4f\n", methods[m], sqrt(square), mean);
-            assert_true(sqrt(square) < 0.02);
-            assert_true(fabs(mean) < 0.004);
+            assert_less(sqrt(square), 0.02);
+            assert_less(fabs(mean), 0.004);
         }
     }
     tear_down(s);

@@ -66,8 +66,7 @@ void write_text(const char *name, const char *text) {
 // Everything that reads numbers, computes with them or writes them.
 Outcome work(int32_t threads = 0) {
     Outcome o;
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
+    vsh_run run = run_on(threads);
     OWNED(vsh_scene) *scene = nullptr;
     OWNED(vsh_assets) *assets = nullptr;
     OWNED(vsh_grid) *grid = nullptr;
@@ -235,8 +234,7 @@ TEST(many_threads_share_one_field) {
     const auto bake = [&](int32_t threads) {
         Outcome o;
         vsh_error why{};
-        vsh_run run = vsh_run_default();
-        run.threads = threads;
+        vsh_run run = run_on(threads);
         OWNED(vsh_voxels) *voxels = nullptr;
         OWNED(vsh_volume) *volume = nullptr;
         o.check(vsh_voxels_from_grid(grid, 2.0, &run, &voxels, &why), why);

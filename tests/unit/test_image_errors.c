@@ -311,17 +311,6 @@ static void expect_text(const char *name, const char *text) {
     assert_string_equal(found, text);
 }
 
-static size_t entries(void) {
-    DIR *directory = opendir(folder);
-    assert_non_null(directory);
-    size_t count = 0;
-    while (readdir(directory) != NULL) {
-        ++count;
-    }
-    closedir(directory);
-    return count;
-}
-
 static void begin(vshi_output *outputs, vshi_output **list) {
     for (size_t i = 0; i < COUNT; ++i) {
         assert_ok(vshi_output_begin(&outputs[i], at(together[i]), &failure));
@@ -332,14 +321,14 @@ static void begin(vshi_output *outputs, vshi_output **list) {
 
 TEST(all_are_in_place_in_the_end) {
     vshi_output outputs[COUNT], *list[COUNT];
-    const size_t before = entries();
+    const int before = entries_in_folder();
     put_text(at(together[1]), "old");
     begin(outputs, list);
     assert_ok(vshi_outputs_commit(list, COUNT, &failure));
     for (size_t i = 0; i < COUNT; ++i) {
         expect_text(together[i], "new");
     }
-    assert_int_equal(entries(), before + COUNT);
+    assert_int_equal(entries_in_folder(), before + COUNT);
     for (size_t i = 0; i < COUNT; ++i) {
         unlink(at(together[i]));
     }
@@ -347,7 +336,7 @@ TEST(all_are_in_place_in_the_end) {
 
 /* A folder that came into the way of each in turn, as nothing but a file can be replaced. */
 TEST(one_that_fails_leaves_all_as_they_were) {
-    const size_t before = entries();
+    const int before = entries_in_folder();
     for (size_t failing = 0; failing < COUNT; ++failing) {
         vshi_output outputs[COUNT], *list[COUNT];
         put_text(at(together[1]), "old");
@@ -364,7 +353,7 @@ TEST(one_that_fails_leaves_all_as_they_were) {
             expect_text(together[i], i == 1 && failing != 1 ? "old" : NULL);
         }
         unlink(at(together[1]));
-        assert_int_equal(entries(), before);
+        assert_int_equal(entries_in_folder(), before);
     }
 }
 

@@ -99,17 +99,6 @@ TEST(rows_make_the_bytes_of_the_whole_image) {
     }
 }
 
-static int entries_in_folder(void) {
-    DIR *directory = opendir(folder);
-    assert_non_null(directory);
-    int count = 0;
-    while (readdir(directory) != NULL) {
-        ++count;
-    }
-    closedir(directory);
-    return count;
-}
-
 static const unsigned char old_content[] = "the old content";
 
 static void assert_untouched(const char *path, int entries) {

@@ -58,8 +58,6 @@ TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
     const counts found = compare(meshes, mesh_count, 512);
-    print_message("%zu samples, %zu in solids, %zu said to be elsewhere\n", found.samples, found.invalid,
-                  found.other);
     assert_true(found.samples > 100000 && found.invalid > 10000);
     assert_int_equal(found.other, 0);
 }
@@ -80,8 +78,6 @@ TEST(samples_below_a_hood_are_where_they_are_by_themselves) {
                            .vertex_count = 12,
                            .triangle_count = 12};
     const counts found = compare(&mesh, 1, 256);
-    print_message("%zu samples, %zu hidden, %zu said to be elsewhere\n", found.samples, found.invalid,
-                  found.other);
     /* a ray that climbs by 0.06 escapes within 0.04 / 0.06 of the rim: the rest is a square, and a little
      * where none of the directions goes straight to the rim */
     const double side = 2.0 - 2.0 * 0.04 / 0.06, square = side * side / 16.0 * (double)found.samples;
