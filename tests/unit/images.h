@@ -2,27 +2,14 @@
 #ifndef TESTS_IMAGES_H
 #define TESTS_IMAGES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/image.h>
-
 #include "base/file.h"
 #include "image/planes.h"
+#include "testing.h"
 
 #include <dirent.h>
-#include <math.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 static char folder[256];
 

@@ -1,4 +1,4 @@
-/* main() of the test programs that have none of their own: runs what they list. Started as a reader
+/* The main() of most test programs: it runs the tests that they list. Started as a reader
  * (vsh_run.reader is the program itself), it serves. */
 #include <unistd.h>
 

@@ -1,19 +1,7 @@
 /* Surfaces of a few charts, and lightmaps of them that hold what a test says, for the tests of seams. */
 #ifndef TESTS_SEAMS_H
 #define TESTS_SEAMS_H
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/bake.h>
+#include "testing.h"
 
 enum { SIDE = 64, TEXELS = SIDE * SIDE, MOST_VERTICES = 1024 };
 
@@ -67,10 +55,7 @@ static inline vsh_charts *charts_of(const vsh_mesh *meshes, size_t count) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
     vsh_charts *charts = NULL;
-    vsh_error error = {0};
-    if (vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &failure));
     return charts;
 }
 
@@ -80,10 +65,7 @@ static inline vsh_stitch_report stitch(const vsh_mesh *meshes, size_t count, con
     vsh_stitch_options options = vsh_stitch_options_default();
     options.max_change = max_change;
     vsh_stitch_report report;
-    vsh_error error = {0};
-    if (vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &failure));
     vsh_charts_free(charts);
     return report;
 }

@@ -341,13 +341,13 @@ TEST(rays_that_agree_early_end_a_point) {
     assert_less(less.marches, full.marches);
     assert_less(fabs(truth_compare(TEXELS, early, all, NULL).bias), 0.006);
     for (size_t i = 0; i < TEXELS; ++i) {
-        /* what has not agreed takes them all, and the same */
+        /* the other points take all rays, the same ones */
         assert_true(early[i] == all[i] || early[i] == 0.0f || early[i] == 1.0f);
     }
 }
 
-/* A slatted roof over a floor: nothing but convex edges, which trilinear samples cut. What rays are to see
- * through it they see to a hundredth. */
+/* A slatted roof over a floor: nothing but convex edges, which trilinear samples cut. Rays must see
+ * through it to a hundredth. */
 TEST(edges_hide_as_much_as_their_casters) {
     enum { SLATS = 7, COUNT = 40 };
     truth_solid slats[SLATS];

@@ -279,8 +279,7 @@ TEST(faults_of_the_promised_size_fail) {
                     VSH_MEASURE_PENUMBRA &
                 1);
     FREED_BY(free_plane)
-    plane lit = make_plane(SIDE, SIDE, 1, ball_at, &still),
-          spot = make_plane(SIDE, SIDE, 1, ball_at, &still);
+    plane lit = make_plane(SIDE, SIDE, 1, ball_at, &still), spot = make_plane(SIDE, SIDE, 1, ball_at, &still);
     for (size_t i = 0; i < 4; ++i) { /* a shadow of four texels, in the lit corner */
         spot.values[(90 + i / 2) * SIDE + 90 + i % 2] = 0.0f;
     }

@@ -1,4 +1,4 @@
-/* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(). */
+/* Charts hidden where surfaces touch: vsh_lightmap_fill_hidden(). */
 #include "seams.h"
 #include "testing.h"
 
