@@ -55,7 +55,10 @@ static inline vsh_charts *charts_of(const vsh_mesh *meshes, size_t count) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
     vsh_charts *charts = NULL;
-    assert_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &failure));
+    vsh_error error = {0};
+    if (vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
     return charts;
 }
 
@@ -65,7 +68,10 @@ static inline vsh_stitch_report stitch(const vsh_mesh *meshes, size_t count, con
     vsh_stitch_options options = vsh_stitch_options_default();
     options.max_change = max_change;
     vsh_stitch_report report;
-    assert_ok(vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &failure));
+    vsh_error error = {0};
+    if (vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &error) != VSH_OK) {
+        fail_msg("%s", error.message);
+    }
     vsh_charts_free(charts);
     return report;
 }
