@@ -129,7 +129,7 @@ static inline vsh_distance sphere_field(sphere *s) {
     return field;
 }
 
-static inline double box(const double p[3], double half) {
+static inline double to_box(const double p[3], double half) {
     double out = 0.0, in = -INFINITY;
     for (int k = 0; k < 3; ++k) {
         const double d = fabs(p[k]) - half;
@@ -140,7 +140,7 @@ static inline double box(const double p[3], double half) {
 }
 
 static inline double unit_cube(const double p[3]) {
-    return box(p, 1.0);
+    return to_box(p, 1.0);
 }
 
 static inline double unit_sphere(const double p[3]) {

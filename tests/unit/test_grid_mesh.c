@@ -93,7 +93,7 @@ TEST(a_mesh_far_away_and_mirrored_is_the_same) {
 
 static double beside(const double p[3]) {
     const double q[3] = {p[0] - 1.013, p[1] - 1.013, p[2] - 1.013};
-    return box(q, 1.0);
+    return to_box(q, 1.0);
 }
 
 /* Half a voxel off the surface signs are those of the union. Distances are its own outside; inside they may
@@ -113,7 +113,7 @@ TEST(boxes_that_cross_in_one_mesh_or_two_are_their_union) {
         FREED_BY(free_leaves) leaves all = leaves_of(grid);
         for (size_t n = 0; n < 512 * all.count; ++n) {
             double p[3];
-            const double value = value_at(&all, n, p), a = box(p, 1.0), b = beside(p), truth = fmin(a, b);
+            const double value = value_at(&all, n, p), a = to_box(p, 1.0), b = beside(p), truth = fmin(a, b);
             assert_true(fabs(truth) <= 0.5 * voxel || (value < 0.0) == (truth < 0.0));
             const double bound = fabs(a) < voxel && fabs(b) < voxel ? 0.5 : 0.1;
             assert_true(truth <= 0.0 || truth >= 2.9 * voxel || fabs(value - truth) < bound * voxel);
@@ -125,11 +125,11 @@ TEST(boxes_that_cross_in_one_mesh_or_two_are_their_union) {
 
 static double dome_and_cube(const double p[3]) {
     const double d = ball(p, 3.0);
-    return fmin(fmax(-d, d - 2.0 * VOXEL), box(p, 1.0));
+    return fmin(fmax(-d, d - 2.0 * VOXEL), to_box(p, 1.0));
 }
 
 static double dome_of_sheets(const double p[3]) {
-    return fmin(fabs(ball(p, 3.0)) - VOXEL, box(p, 1.0));
+    return fmin(fabs(ball(p, 3.0)) - VOXEL, to_box(p, 1.0));
 }
 
 TEST(a_sky_dome_leaves_what_it_holds_and_one_that_looks_outwards_holds_air) {
@@ -146,7 +146,7 @@ TEST(a_sky_dome_leaves_what_it_holds_and_one_that_looks_outwards_holds_air) {
 }
 
 static double house(const double p[3]) {
-    return fmin(fmax(box(p, 2.0), -box(p, 1.0)), box(p, 0.5));
+    return fmin(fmax(to_box(p, 2.0), -to_box(p, 1.0)), to_box(p, 0.5));
 }
 
 TEST(houses_have_rooms_with_furniture_in_one_mesh_or_many) {
@@ -178,7 +178,7 @@ TEST(houses_have_rooms_with_furniture_in_one_mesh_or_many) {
 }
 
 static double room(const double p[3]) { /* walls of two voxels around the cube */
-    const double d = box(p, 1.0);
+    const double d = to_box(p, 1.0);
     return fmax(-d, d - 2.0 * VOXEL);
 }
 
@@ -204,7 +204,7 @@ TEST(the_door_of_a_room_stays_open) {
         double p[3];
         const double value = value_at(&all, n, p), truth = room(p);
         const bool doorway = fabs(p[0]) < 0.8 && fabs(p[2]) < 0.8 && p[1] < -0.5;
-        const bool air = box(p, 1.0)<-0.01 * VOXEL, wall = p[1]> - 0.7 && fabs(truth) < 0.9 * VOXEL;
+        const bool air = to_box(p, 1.0)<-0.01 * VOXEL, wall = p[1]> - 0.7 && fabs(truth) < 0.9 * VOXEL;
         assert_true(!(doorway || air) || value > 0.0);
         assert_true(!wall || fabs(value - truth) < 0.1 * VOXEL);
         compared += doorway || air || wall;
@@ -213,7 +213,7 @@ TEST(the_door_of_a_room_stays_open) {
 }
 
 static double room_of_sheets(const double p[3]) {
-    return fabs(box(p, 1.0)) - VOXEL;
+    return fabs(to_box(p, 1.0)) - VOXEL;
 }
 
 TEST(rooms_of_separate_walls_hold_air) {
@@ -291,7 +291,7 @@ static double mixed(const double p[3]) {
     const double q[3] = {p[0] - 4.0, p[1], p[2]};
     const double x = fmax(fabs(q[0]) - 1.0, 0.0), y = fmax(fabs(q[1]) - 1.0, 0.0);
     const double card = sqrt(x * x + y * y + (q[2] - 1.0) * (q[2] - 1.0)) - VOXEL;
-    return fmin(box(p, 1.0), card);
+    return fmin(to_box(p, 1.0), card);
 }
 
 TEST(a_card_in_a_solid_s_mesh_leaves_it_solid) {
