@@ -4,8 +4,6 @@
 #include <math.h>
 #include <stdbool.h>
 
-OWNER(vsh_assets)
-OWNER(vsh_flat_scene)
 OWNER(vsh_provenance)
 
 static void free_list(double **list) {

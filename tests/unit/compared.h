@@ -13,6 +13,10 @@ typedef struct plane {
     float *values;
 } plane;
 
+static inline void free_plane(plane *p) {
+    free(p->values);
+}
+
 /* Value at a place, texels; `user` is the test's own. */
 typedef double plane_fn(const void *user, double x, double y, double z);
 
@@ -28,9 +32,6 @@ static inline plane make_plane(int32_t width, int32_t height, int32_t depth, pla
 }
 
 static inline double flat(const void *user, double x, double y, double z) {
-    (void)x;
-    (void)y;
-    (void)z;
     return *(const double *)user;
 }
 
@@ -51,10 +52,9 @@ static inline vsh_measures measure(const plane *golden, const plane *values, con
 /* Compares two pictures that one function draws from `golden` and `values`. */
 static inline vsh_measures measure_as(int32_t width, int32_t height, int32_t depth, plane_fn *fn,
                                       const void *golden, const void *values) {
+    FREED_BY(free_plane)
     plane a = make_plane(width, height, depth, fn, golden), b = make_plane(width, height, depth, fn, values);
     const vsh_measures m = measure(&a, &b, NULL);
-    free(a.values);
-    free(b.values);
     return m;
 }
 

@@ -179,4 +179,8 @@ inline bool make_folder() {
     return mkdtemp(folder.data()) != nullptr;
 }
 
+inline int begin_folder(void **) {
+    return make_folder() ? 0 : 1;
+}
+
 #endif

@@ -14,6 +14,10 @@ typedef struct leaves {
     vsh_grid_info info;
 } leaves;
 
+static inline void free_leaves(leaves *all) {
+    free(all->leaf);
+}
+
 static inline leaves leaves_of(const vsh_grid *grid) {
     leaves all;
     all.count = vshi_grid_leaves(grid, NULL, 0);
@@ -34,6 +38,12 @@ static inline void voxel_position(const leaves *all, size_t leaf, int voxel, dou
     }
 }
 
+/* The value of a voxel, of 512 in each leaf, and where it lies. */
+static inline double value_at(const leaves *all, size_t voxel, double position[3]) {
+    voxel_position(all, voxel / 512, (int)(voxel % 512), position);
+    return (double)all->leaf[voxel / 512].values[voxel % 512];
+}
+
 typedef double truth_fn(const double position[3]);
 
 /* Largest error, in voxels, over voxels whose true distance lies in -inside … outside voxels; and the signs
@@ -43,33 +53,28 @@ static inline double worst_error(const vsh_grid *grid, truth_fn *truth, double i
     const double background = all.info.half_width * all.info.voxel_size;
     double worst = 0.0;
     size_t compared = 0;
-    for (size_t i = 0; i < all.count; ++i) {
-        for (int v = 0; v < 512; ++v) {
-            double p[3];
-            voxel_position(&all, i, v, p);
-            const double expected = truth(p);
-            const double value = (double)all.leaf[i].values[v];
-            assert_true(fabs(value) <= background * (1.0 + 1e-6));
-            if (expected > -inside * all.info.voxel_size && expected < outside * all.info.voxel_size) {
-                worst = fmax(worst, fabs(value - expected) / all.info.voxel_size);
-                ++compared;
-            } else {
-                assert_int_equal(value < 0.0, expected < 0.0);
-            }
+    for (size_t i = 0; i < 512 * all.count; ++i) {
+        double p[3];
+        const double value = value_at(&all, i, p), expected = truth(p);
+        assert_true(fabs(value) <= background * (1.0 + 1e-6));
+        if (expected > -inside * all.info.voxel_size && expected < outside * all.info.voxel_size) {
+            worst = fmax(worst, fabs(value - expected) / all.info.voxel_size);
+            ++compared;
+        } else {
+            assert_int_equal(value < 0.0, expected < 0.0);
         }
     }
-    free(all.leaf);
     assert_true(compared > 1000);
     return worst;
 }
 
 /* Share of blocks over the whole box whose sign is not the truth's, away from the surface. */
 static inline size_t wrong_blocks(const vsh_grid *grid, truth_fn *truth, int32_t reach) {
-    leaves all = leaves_of(grid);
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
     const int32_t origin[3] = {-8 * reach, -8 * reach, -8 * reach};
     const int32_t size[3] = {2 * reach, 2 * reach, 2 * reach};
     const size_t count = (size_t)8 * (size_t)(reach * reach) * (size_t)reach;
-    int8_t *signs = malloc(count);
+    FREED int8_t *signs = malloc(count);
     assert_non_null(signs);
     vshi_grid_block_signs(grid, origin, size, signs);
     size_t wrong = 0;
@@ -85,13 +90,11 @@ static inline size_t wrong_blocks(const vsh_grid *grid, truth_fn *truth, int32_t
         const double expected = truth(p);
         wrong += fabs(expected) > 0.5 * all.info.voxel_size && (expected < 0.0) != (signs[i] < 0);
     }
-    free(signs);
-    free(all.leaf);
     return wrong;
 }
 
 static inline void assert_same_leaves(const vsh_grid *a, const vsh_grid *b, float tolerance) {
-    leaves left = leaves_of(a), right = leaves_of(b);
+    FREED_BY(free_leaves) leaves left = leaves_of(a), right = leaves_of(b);
     assert_int_equal(left.count, right.count);
     for (size_t i = 0; i < left.count; ++i) {
         assert_memory_equal(left.leaf[i].origin, right.leaf[i].origin, sizeof left.leaf[i].origin);
@@ -102,8 +105,6 @@ static inline void assert_same_leaves(const vsh_grid *a, const vsh_grid *b, floa
             assert_true(fabsf(left.leaf[i].values[v] - right.leaf[i].values[v]) <= tolerance);
         }
     }
-    free(left.leaf);
-    free(right.leaf);
 }
 
 typedef struct sphere {
@@ -126,6 +127,20 @@ static inline vsh_distance sphere_field(sphere *s) {
         field.bounds_max[i] = s->centre[i] + s->radius;
     }
     return field;
+}
+
+static inline double to_box(const double p[3], double half) {
+    double out = 0.0, in = -INFINITY;
+    for (int k = 0; k < 3; ++k) {
+        const double d = fabs(p[k]) - half;
+        out += d > 0.0 ? d * d : 0.0;
+        in = fmax(in, d);
+    }
+    return out > 0.0 ? sqrt(out) : in;
+}
+
+static inline double unit_cube(const double p[3]) {
+    return to_box(p, 1.0);
 }
 
 static inline double unit_sphere(const double p[3]) {

@@ -2,27 +2,14 @@
 #ifndef TESTS_IMAGES_H
 #define TESTS_IMAGES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/image.h>
-
 #include "base/file.h"
 #include "image/planes.h"
+#include "testing.h"
 
 #include <dirent.h>
-#include <math.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 static char folder[256];
 
@@ -84,6 +71,17 @@ static inline void write_all(const char *path, const unsigned char *bytes, size_
     assert_non_null(file);
     assert_int_equal(fwrite(bytes, 1, size, file), size);
     assert_int_equal(fclose(file), 0);
+}
+
+static inline int entries_in_folder(void) {
+    DIR *directory = opendir(folder);
+    assert_non_null(directory);
+    int count = 0;
+    while (readdir(directory) != NULL) {
+        ++count;
+    }
+    closedir(directory);
+    return count;
 }
 
 static inline int make_folder(void **state) {

@@ -5,10 +5,6 @@
 #include "casts.h"
 #include "previews.h"
 #include "testing.h"
-#include <math.h>
-#include <stdlib.h>
-
-#include <vdbshade/bake.h>
 
 enum { SIZE = 64, TEXELS = SIZE * SIZE };
 

@@ -93,10 +93,7 @@ static inline void refused(const char *name, const char *text, vsh_result code, 
 static inline vsh_mesh_report check(const vsh_model *model, size_t index) {
     const vsh_mesh mesh = vsh_model_mesh(model, index, -1);
     vsh_mesh_report report;
-    vsh_error error = {0};
-    if (vsh_mesh_check(&mesh, &report, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_mesh_check(&mesh, &report, &failure));
     return report;
 }
 

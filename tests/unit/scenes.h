@@ -2,20 +2,8 @@
 #ifndef TESTS_SCENES_H
 #define TESTS_SCENES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "scene/scene.h"
+#include "testing.h"
 
 static inline vsh_scene *parse(const char *path, const char *text) {
     vsh_scene *scene = NULL;

@@ -1,19 +1,7 @@
 /* Surfaces of a few charts, and lightmaps of them that hold what a test says, for the tests of seams. */
 #ifndef TESTS_SEAMS_H
 #define TESTS_SEAMS_H
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/bake.h>
+#include "testing.h"
 
 enum { SIDE = 64, TEXELS = SIDE * SIDE, MOST_VERTICES = 1024 };
 

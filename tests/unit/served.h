@@ -20,11 +20,8 @@ static inline vsh_model *read_gltf_by(bool reader, const char *json) {
     run.reader_seconds = reader ? 120.0 : 0.0;
     warnings[0] = '\0';
     vsh_model *model = NULL;
-    vsh_error error = {0};
     write_bytes("a.gltf", json, strlen(json));
-    if (vsh_model_read(path_of("a.gltf").text, &run, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure));
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
     return model;
 }

@@ -3,12 +3,11 @@
 #ifndef TESTS_TERRAIN_H
 #define TESTS_TERRAIN_H
 
+#include "mesh/mesh.h"
 #include "shading.h"
+#include "testing.h"
 #include "truth/embree.h"
 #include "truth/metrics.h"
-
-#include <stdlib.h>
-#include <vdbshade/heights.h>
 
 /* Height 0 … 1 of sample (i, j) of `n`, the same hills whatever n. */
 static inline float hill(int i, int j, int n) {
@@ -46,20 +45,28 @@ static inline vsh_heights_source source_of(const float *values, int columns, int
 
 static inline vsh_model *model_of(const vsh_heights_source *source, int32_t what) {
     vsh_model *model = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_model_from_heights(source, what, NULL, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_model_from_heights(source, what, NULL, &model, &failure));
     return model;
 }
 
 static inline vsh_heights *heights_of(const vsh_heights_source *source) {
     vsh_heights *heights = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_heights_create(source, NULL, &heights, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_heights_create(source, NULL, &heights, &failure));
     return heights;
+}
+
+/* Point `number` of triangle `face`, by two shares of its edges, a little above it, and the facet's normal.
+ */
+static inline void stand_on(const vsh_mesh *mesh, size_t face, double b, double c, size_t number,
+                            double *positions, float *normals) {
+    vshi_vec corner[3];
+    vshi_mesh_triangle(mesh, face, corner);
+    const vshi_vec ab = vshi_sub(corner[1], corner[0]), ac = vshi_sub(corner[2], corner[0]);
+    const vshi_vec n = vshi_unit(vshi_cross(ab, ac));
+    const vshi_vec p = vshi_add(corner[0], vshi_add(vshi_scale(ab, b), vshi_scale(ac, c)));
+    const vshi_vec q = vshi_add(p, vshi_scale(n, 1e-4));
+    memcpy(positions + 3 * number, (const double[]){q.x, q.y, q.z}, sizeof(double[3]));
+    memcpy(normals + 3 * number, (const float[]){(float)n.x, (float)n.y, (float)n.z}, sizeof(float[3]));
 }
 
 #endif

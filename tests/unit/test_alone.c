@@ -65,7 +65,7 @@ static void ask(const vsh_query *query, bool ao, size_t count, size_t batch, flo
 
 static void compare(const vsh_field *field, const vsh_light *light, const vsh_shade_options *options,
                     size_t count) {
-    vsh_query *query = NULL;
+    OWNED(vsh_query) *query = NULL;
     assert_ok(vsh_query_create(occluders_of(field), light, light != NULL, options, &query, &failure));
     ask(query, light == NULL, count, count, among);
     const size_t batches[] = {1, 1000};
@@ -83,7 +83,6 @@ static void compare(const vsh_field *field, const vsh_light *light, const vsh_sh
                      different, count, batches[b], most, (double)fabsf(alone[most] - among[most]));
         }
     }
-    vsh_query_free(query);
 }
 
 static void compare_shadows(const vsh_field *field, const vsh_light *light, int32_t first, int32_t last) {
@@ -97,12 +96,11 @@ static void compare_shadows(const vsh_field *field, const vsh_light *light, int3
 
 TEST(a_sun_that_the_horizon_cuts_is_as_bright_for_one_point_as_for_many) {
     uint64_t counter = 7919;
-    vsh_field *field = field_of(crowd(&counter, true), 0.04, 0.0);
+    OWNED(vsh_field) *field = field_of(crowd(&counter, true), 0.04, 0.0);
     place_points(true);
     const double low[3] = {0.5, 0.3, 0.6};
     const vsh_light light = sun(low, RADIANS(40.0));
     compare_shadows(field, &light, VSH_SHADOW_HARD, VSH_SHADOW_CONE);
-    vsh_field_free(field);
 }
 
 /* Deep in an umbra, where a march may miss the deepest place of what hides the sun. */
@@ -118,10 +116,9 @@ TEST(a_sun_behind_walls_is_as_dark_for_one_point_as_for_many) {
     };
     const double towards[3] = {0.6976726109006347, 0.71458854441526731, 0.051148217853225181};
     const vsh_light light = sun(towards, 0.20943951023931953);
-    vsh_field *field = field_of((truth_scene){walls, 3}, 0.02, 0.0);
+    OWNED(vsh_field) *field = field_of((truth_scene){walls, 3}, 0.02, 0.0);
     place_points(false);
     compare_shadows(field, &light, VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE);
-    vsh_field_free(field);
 }
 
 /* Lamps of which single points saw more, or less, than blocks of them before: by up to 0.2 with `cone`, by
@@ -143,33 +140,30 @@ TEST(lamps_among_solids_are_as_bright_for_one_point_as_for_many) {
     for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; ++i) {
         uint64_t counter = CASES[i].scene;
         const bool walls = CASES[i].scene % 2 == 1;
-        vsh_field *field = field_of(crowd(&counter, walls), CASES[i].voxel, 0.0);
+        OWNED(vsh_field) *field = field_of(crowd(&counter, walls), CASES[i].voxel, 0.0);
         place_points(CASES[i].leaning);
         const vsh_light light = lamp(CASES[i].place, CASES[i].radius);
         compare_shadows(field, &light, CASES[i].leaning ? VSH_SHADOW_HARD : VSH_SHADOW_CLASSIC,
                         CASES[i].leaning ? VSH_SHADOW_HARD : VSH_SHADOW_RAYS);
-        vsh_field_free(field);
     }
 }
 
 TEST(ao_and_steps_of_chance_are_those_of_the_point) {
     uint64_t counter = 5;
-    vsh_field *field = field_of(crowd(&counter, false), 0.05, 0.0);
+    OWNED(vsh_field) *field = field_of(crowd(&counter, false), 0.05, 0.0);
     place_points(true);
     vsh_shade_options options = preview_options();
     options.rays = 8;
     options.ao_distance = 0.5;
     for (options.ao_method = VSH_AO_TAPS; options.ao_method < VSH_AO_EXACT; ++options.ao_method) {
-        compare(field, NULL, &options, SOME);
+        for (options.sampler = VSH_SAMPLER_SOBOL; options.sampler <= VSH_SAMPLER_BLUE; ++options.sampler) {
+            compare(field, NULL, &options, SOME);
+        }
     }
+    options.sampler = VSH_SAMPLER_SOBOL;
     options.ao_method = VSH_AO_CONES;
     options.jitter = 0.5;
     const double high[3] = {0.4, 0.8, 0.3};
     const vsh_light light = sun(high, RADIANS(10.0));
     compare(field, &light, &options, SOME);
-    vsh_field_free(field);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -65,32 +65,16 @@ static int set_up(void **state) {
 }
 
 static int tear_down(void **state) {
-    stage *s = *state;
+    FREED stage *s = *state;
     caster_free(&s->casters);
     free_sphere(&s->ball);
-    free(s);
     return 0;
 }
 
-/* Planes beside AO, its error and bent normals, or not with them. */
-enum { WITH_SKY = 1, TANGENT_SPACE = 2, WITHOUT_AO = 4, WITHOUT_BENT = 8 };
-
 typedef struct baked {
-    float ao[TEXELS], error[TEXELS], bent[3 * TEXELS], sky[TEXELS], coverage[TEXELS];
+    float ao[TEXELS], error[TEXELS], bent[3 * TEXELS], coverage[TEXELS];
     vsh_shade_stats stats;
-    uint32_t planes;
 } baked;
-
-static vsh_lightmap planes_of(baked *b) {
-    const bool ao = (b->planes & WITHOUT_AO) == 0, tangent = (b->planes & TANGENT_SPACE) != 0;
-    return (vsh_lightmap){.ao = ao ? b->ao : NULL,
-                          .ao_error = ao ? b->error : NULL,
-                          .bent = (b->planes & WITHOUT_BENT) == 0 ? b->bent : NULL,
-                          .bent_space = tangent ? VSH_BENT_TANGENT : VSH_BENT_WORLD,
-                          .sky = (b->planes & WITH_SKY) != 0 ? b->sky : NULL,
-                          .asked = {.sky = VSH_UP_Y},
-                          .coverage = b->coverage};
-}
 
 typedef struct how {
     int32_t spacing;
@@ -98,79 +82,39 @@ typedef struct how {
     int32_t padding;
     int32_t threads;
     size_t receivers; /* of the first so many; 0: all */
-    uint32_t planes;
-    bool marched; /* by VSH_AO_ADAPTIVE */
+    bool marched;     /* by VSH_AO_ADAPTIVE */
 } how;
 
-static baked *begin_baked(uint32_t planes) {
-    baked *b = malloc(sizeof *b);
-    assert_non_null(b);
-    memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
-    b->stats = vsh_shade_stats_zero();
-    b->planes = planes;
-    return b;
-}
-
-static vsh_lightmap_options options_of(how h) {
+static baked *bake(const stage *s, how h) {
     vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
     options.padding = h.padding;
-    options.tangents = 1;
     options.ao_spacing = h.spacing;
     options.shade.ao_method = h.marched ? VSH_AO_ADAPTIVE : VSH_AO_EXACT;
     options.shade.ao_distance = 0.8;
     options.shade.rays = 0; /* as many as the error takes */
     options.shade.max_error = h.max_error;
-    return options;
-}
-
-static baked *bake(const stage *s, how h) {
-    const vsh_lightmap_options options = options_of(h);
-    const size_t receivers = h.receivers == 0 ? RECEIVERS : h.receivers;
-    baked *b = begin_baked(h.planes);
-    vsh_charts *charts = create(s->receivers, receivers, options, NULL);
-    const vsh_lightmap lightmap = planes_of(b);
+    baked *b = malloc(sizeof *b);
+    assert_non_null(b);
+    memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
+    OWNED(vsh_charts) *charts =
+        create(s->receivers, h.receivers == 0 ? RECEIVERS : h.receivers, options, NULL);
+    const vsh_lightmap lightmap = {
+        .ao = b->ao, .ao_error = b->error, .bent = b->bent, .coverage = b->coverage};
     const vsh_run run = run_on(h.threads);
     vsh_bake_stats stats = vsh_bake_stats_zero();
     assert_ok(vsh_bake_lightmap(occluders_of_caster(&s->casters), charts, NULL, 0, &options.shade, &run,
                                 &lightmap, &stats, &failure));
     b->stats = stats.shade;
-    vsh_charts_free(charts);
     return b;
 }
 
-static void assert_same_plane(const char *name, const float *a, const float *b, size_t floats) {
-    for (size_t i = 0; i < floats * TEXELS; ++i) {
-        if (memcmp(&a[i], &b[i], sizeof a[i]) != 0) {
-            fail_msg("%s, row %zu, column %zu: %.9g, then %.9g", name, i / floats / WIDTH, i / floats % WIDTH,
-                     (double)a[i], (double)b[i]);
-        }
-    }
-}
-
-static void assert_same(const baked *a, const baked *b) {
-    const uint32_t without = a->planes | b->planes, with = a->planes & b->planes;
-    assert_same_plane("coverage", a->coverage, b->coverage, 1);
-    if ((without & WITHOUT_AO) == 0) {
-        assert_same_plane("ao", a->ao, b->ao, 1);
-        assert_same_plane("ao_error", a->error, b->error, 1);
-    }
-    if ((without & WITHOUT_BENT) == 0) {
-        assert_same_plane("bent", a->bent, b->bent, 3);
-    }
-    if ((with & WITH_SKY) != 0) {
-        assert_same_plane("sky", a->sky, b->sky, 1);
-    }
-    assert_memory_equal(&a->stats, &b->stats, sizeof a->stats);
-}
-
 TEST(threads_change_no_bit) {
-    baked *one = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = 1});
+    FREED baked *one = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = 1});
     for (int32_t threads = 2; threads <= 8; ++threads) {
-        baked *more = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = threads});
-        assert_same(one, more);
-        free(more);
+        FREED baked *more =
+            bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = threads});
+        assert_memory_equal(one, more, sizeof *one);
     }
-    free(one);
 }
 
 /* Root mean squares over covered texels; of bent normals weighted by AO, for in the dark they point anywhere.
@@ -214,11 +158,11 @@ TEST(errors_are_below_those_asked_for_with_few_rays) {
     static const double errors[] = {0.05, 0.02, 0.01}, angles[] = {2.6, 1.8, 1.35};
     /* with 8 rays at first, whatever the error, RMSE is 0.0103 at 0.02 and 0.0068 at 0.01 */
     static const double most[] = {0.016, 0.0092, 0.0062};
-    baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.002});
+    FREED baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.002});
     double before = INFINITY;
     for (size_t e = 0; e < 3; ++e) {
-        baked *shared = bake(*state, (how){.spacing = 4, .max_error = errors[e]}),
-              *alone = bake(*state, (how){.spacing = 1, .max_error = errors[e]});
+        FREED baked *shared = bake(*state, (how){.spacing = 4, .max_error = errors[e]}),
+                    *alone = bake(*state, (how){.spacing = 1, .max_error = errors[e]});
         const judged j = judge(shared, truth), a = judge(alone, truth);
         print_message("asked %g: RMSE %.5f, said %.5f (%.2f), most %.3f, bias %+.5f, bent %.2f°, %.0f rays\n",
                       errors[e], j.is, j.said, j.is / j.said, j.most, j.bias, j.angle,
@@ -236,32 +180,26 @@ TEST(errors_are_below_those_asked_for_with_few_rays) {
         assert_true(all > 0.999 * noise && all < 2.0 * j.is * j.is * (double)j.count);
         assert_true(j.is < 1.1 * sqrt(all / (double)j.count));
         before = j.is;
-        free(alone);
-        free(shared);
     }
-    free(truth);
 }
 
 /* Compared with rays on the same field that no texels share. */
 TEST(marched_rays_are_shared_too) {
-    baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.004, .marched = true}),
-          *shared = bake(*state, (how){.spacing = 4, .max_error = 0.02, .marched = true}),
-          *alone = bake(*state, (how){.spacing = 1, .max_error = 0.02, .marched = true});
+    FREED baked *truth = bake(*state, (how){.spacing = 1, .max_error = 0.004, .marched = true}),
+                *shared = bake(*state, (how){.spacing = 4, .max_error = 0.02, .marched = true}),
+                *alone = bake(*state, (how){.spacing = 1, .max_error = 0.02, .marched = true});
     const judged j = judge(shared, truth), a = judge(alone, truth);
     print_message("RMSE %.5f, said %.5f, most %.3f, %.0f rays; alone %.5f, %.0f rays\n", j.is, j.said, j.most,
                   (double)shared->stats.rays, a.is, (double)alone->stats.rays);
     assert_true(j.is < a.is && j.most < 0.3);
     assert_true(j.is < 1.1 * sqrt(shared->stats.ao_square_error / (double)j.count));
     assert_true(shared->stats.rays * 2 < alone->stats.rays);
-    free(alone);
-    free(shared);
-    free(truth);
 }
 
 /* The wall's chart lies within reach of windows of the floor's, and has texels in the same tiles. */
 TEST(charts_take_nothing_from_each_other) {
-    baked *all = bake(*state, (how){.spacing = 4, .max_error = 0.02}),
-          *floor = bake(*state, (how){.spacing = 4, .max_error = 0.02, .receivers = 1});
+    FREED baked *all = bake(*state, (how){.spacing = 4, .max_error = 0.02}),
+                *floor = bake(*state, (how){.spacing = 4, .max_error = 0.02, .receivers = 1});
     size_t near = 0;
     for (size_t i = 0; i < TEXELS; ++i) {
         if (floor->coverage[i] > 0.0f) {
@@ -273,8 +211,6 @@ TEST(charts_take_nothing_from_each_other) {
         }
     }
     assert_true(near > 100);
-    free(floor);
-    free(all);
 }
 
 /* Windows on what is curved: under an open sky all is as it would be alone. */
@@ -345,8 +281,8 @@ TEST(fine_texels_take_few_rays) {
     }
     s.receivers[0].positions = s.floor.positions;
     s.receivers[0].uvs = s.floor.uvs;
-    baked *few = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1}),
-          *truth = bake(&s, (how){.spacing = 1, .max_error = 0.005, .receivers = 1});
+    FREED baked *few = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1}),
+                *truth = bake(&s, (how){.spacing = 1, .max_error = 0.005, .receivers = 1});
     const judged j = judge(few, truth);
     const double rays = (double)few->stats.rays / (double)j.count;
     print_message("RMSE %.5f, said %.5f, most %.3f, bias %+.5f, bent %.2f°, %.2f rays a texel\n", j.is,
@@ -354,8 +290,6 @@ TEST(fine_texels_take_few_rays) {
     assert_true(rays < 6.0);
     assert_true(j.is < 0.02 && j.most < 0.15 && fabs(j.bias) < 0.004 && j.angle < 3.0);
     assert_true(j.is < 1.1 * sqrt(few->stats.ao_square_error / (double)j.count));
-    free(truth);
-    free(few);
 }
 
 /* AO of a floor of 256² texels, 2 × 3 units, under and beside a board that hovers just over its first `rows`
@@ -367,8 +301,8 @@ static void bake_board(int32_t rows, int32_t spacing, double max_error, float *a
     float corners[24];
     const double low[3] = {-0.5, 3.0 * (1.0 - (double)rows / SIDE), 0.0004}, high[3] = {2.5, 3.5, 0.05};
     const vsh_mesh meshes[2] = {floor.mesh, box_mesh(corners, low, high)};
-    vsh_triangles *triangles = NULL;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     assert_ok(vsh_triangles_create(meshes, 2, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
@@ -378,12 +312,9 @@ static void bake_board(int32_t rows, int32_t spacing, double max_error, float *a
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 1.0;
     options.shade.max_error = max_error;
-    vsh_charts *charts = create(&floor.mesh, 1, options, NULL);
+    OWNED(vsh_charts) *charts = create(&floor.mesh, 1, options, NULL);
     const vsh_lightmap lightmap = {.ao = ao};
     assert_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &failure));
-    vsh_charts_free(charts);
-    vsh_occluders_free(occluders);
-    vsh_triangles_free(triangles);
 }
 
 /* Texels between a lattice's last ones in a square and the next square are told by one side alone. */
@@ -406,6 +337,4 @@ TEST(what_ends_beside_a_square_darkens_no_texel_of_the_next_row) {
     }
 }
 
-int main(void) {
-    return run_all_tests(set_up, tear_down);
-}
+FIXTURE(set_up, tear_down)

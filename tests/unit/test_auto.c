@@ -1,45 +1,23 @@
 /* What is baked where no method is named: the error that was asked for, whatever the voxels. */
+#include "shapes.h"
 #include "testing.h"
 #include "traced.h"
 
-enum { MOST = 64, SIDE = 48, COUNT = SIDE * SIDE };
-
-/* Boxes and cards as one mesh, on a board of UVs that is the first quad. */
-typedef struct shape {
-    float positions[24 * MOST * 3], uvs[24 * MOST * 2];
-    uint32_t indices[36 * MOST];
-    vsh_mesh mesh;
-} shape;
-
-static void add_quad(shape *s, const float corners[4][3]) {
-    const uint32_t first = (uint32_t)s->mesh.vertex_count;
-    const uint32_t order[6] = {0, 1, 2, 0, 2, 3};
-    memcpy(s->positions + 3 * first, corners, 12 * sizeof(float));
-    for (int k = 0; k < 6; ++k) {
-        s->indices[3 * s->mesh.triangle_count + (size_t)k] = first + order[k];
-    }
-    s->mesh.vertex_count += 4;
-    s->mesh.triangle_count += 2;
-    s->mesh.positions = s->positions;
-    s->mesh.indices = s->indices;
-    s->mesh.name = "shape";
-}
+enum { SIDE = 48, COUNT = SIDE * SIDE };
 
 static void add_box(shape *s, double x0, double y0, double z0, double x1, double y1, double z1) {
-    const float a[3] = {(float)x0, (float)y0, (float)z0}, b[3] = {(float)x1, (float)y1, (float)z1};
-    const float sides[6][4][3] = {
-        {{a[0], a[1], b[2]}, {b[0], a[1], b[2]}, {b[0], b[1], b[2]}, {a[0], b[1], b[2]}},
-        {{b[0], a[1], a[2]}, {a[0], a[1], a[2]}, {a[0], b[1], a[2]}, {b[0], b[1], a[2]}},
-        {{b[0], a[1], b[2]}, {b[0], a[1], a[2]}, {b[0], b[1], a[2]}, {b[0], b[1], b[2]}},
-        {{a[0], a[1], a[2]}, {a[0], a[1], b[2]}, {a[0], b[1], b[2]}, {a[0], b[1], a[2]}},
-        {{a[0], b[1], b[2]}, {b[0], b[1], b[2]}, {b[0], b[1], a[2]}, {a[0], b[1], a[2]}},
-        {{a[0], a[1], a[2]}, {b[0], a[1], a[2]}, {b[0], a[1], b[2]}, {a[0], a[1], b[2]}}};
-    for (int k = 0; k < 6; ++k) {
-        add_quad(s, sides[k]);
-    }
+    shape_box(s, (double[3]){x0, y0, z0}, (double[3]){x1, y1, z1}, ALL_SIDES);
 }
 
-static casting make(const vsh_mesh *meshes, size_t count, double voxel) {
+static void add_quad(shape *s, const double corners[4][3]) {
+    uint32_t v[4];
+    for (int k = 0; k < 4; ++k) {
+        v[k] = shape_vertex(s, corners[k][0], corners[k][1], corners[k][2]);
+    }
+    shape_quad(s, v[0], v[1], v[2], v[3]);
+}
+
+static casting make_of(const vsh_mesh *meshes, size_t count, double voxel) {
     const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
     casting c = {NULL, NULL};
@@ -47,6 +25,11 @@ static casting make(const vsh_mesh *meshes, size_t count, double voxel) {
     assert_ok(vsh_triangles_create(meshes, count, NULL, &c.triangles, &failure));
     c.field = field_of_grid(grid, 4.0);
     return c;
+}
+
+static casting make(const shape *s, double voxel) {
+    const vsh_mesh mesh = shape_mesh(s, "shape");
+    return make_of(&mesh, 1, voxel);
 }
 
 static double positions[3 * COUNT];
@@ -94,10 +77,9 @@ static double rmse_to_truth(const casting *c, const vsh_points *points, const vs
 }
 
 TEST(the_default_is_exact_with_triangles_and_adaptive_without) {
-    static shape s;
-    s = (shape){.mesh = {.vertex_count = 0}};
-    add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
-    casting c = make(&s.mesh, 1, 0.05);
+    FREED shape *s = shape_new();
+    add_box(s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
+    FREED_BY(caster_free) casting c = make(s, 0.05);
     const vsh_points points = board(1.0, 0.0);
     for (int traced = 0; traced < 2; ++traced) {
         vsh_shade_options options = vsh_shade_options_default(), named = options;
@@ -115,14 +97,12 @@ TEST(the_default_is_exact_with_triangles_and_adaptive_without) {
         assert_int_equal(vsh_shadow_method_resolve(VSH_SHADOW_AUTO, traced), named.method);
         assert_int_equal(vsh_ao_method_resolve(VSH_AO_AUTO, traced), named.ao_method);
     }
-    caster_free(&c);
 }
 
 TEST(a_layer_takes_the_method_that_its_own_triangles_allow) {
-    static shape s;
-    s = (shape){.mesh = {.vertex_count = 0}};
-    add_box(&s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
-    casting c = make(&s.mesh, 1, 0.05);
+    FREED shape *s = shape_new();
+    add_box(s, -0.3, 0.2, -0.3, 0.3, 0.8, 0.3);
+    FREED_BY(caster_free) casting c = make(s, 0.05);
     const vsh_points points = board(1.0, 0.0);
     vsh_layer layer = vsh_layer_default();
     layer.field = c.field; /* no triangles */
@@ -134,16 +114,14 @@ TEST(a_layer_takes_the_method_that_its_own_triangles_allow) {
     shade_by(&casters, &points, &options, other);
     assert_memory_equal(values, other, sizeof values);
     assert_ok(vsh_shade_ao(&casters, &points, &options, NULL, values, NULL, NULL, NULL, &failure));
-    caster_free(&c);
 }
 
 TEST(rays_follow_from_the_error_unless_they_are_limited) {
-    static shape s;
-    s = (shape){.mesh = {.vertex_count = 0}};
+    FREED shape *s = shape_new();
     for (int i = 0; i < 10; ++i) {
-        add_box(&s, -1.0 + 0.2 * i, 0.5, -1.0, -0.92 + 0.2 * i, 0.55, 1.0);
+        add_box(s, -1.0 + 0.2 * i, 0.5, -1.0, -0.92 + 0.2 * i, 0.55, 1.0);
     }
-    casting c = make(&s.mesh, 1, 0.03);
+    FREED_BY(caster_free) casting c = make(s, 0.03);
     const vsh_points points = board(1.0, 0.0);
     vsh_shade_options options = vsh_shade_options_default();
     options.max_error = 0.003;
@@ -152,65 +130,55 @@ TEST(rays_follow_from_the_error_unless_they_are_limited) {
     options.rays = 32;
     const double limited = rmse_to_truth(&c, &points, &options);
     const double told = sqrt(shade(&c, &points, &options, values).square_error / COUNT);
-    print_message("asked for 0.003: %.4f, said %.4f; of 32 rays %.4f, said %.4f\n", free, said, limited,
-                  told);
     assert_true(free <= 0.003 && said <= 0.003 && said >= 0.9 * free);
     assert_true(limited > 0.003 && told > 0.003);
-    caster_free(&c);
 }
 
 TEST(parts_thinner_than_voxels_are_found_lost) {
-    static shape fence, block;
-    fence = block = (shape){.mesh = {.vertex_count = 0}};
+    FREED shape *fence = shape_new(), *block = shape_new();
     for (int i = 0; i < 10; ++i) {
-        add_box(&fence, -1.0 + 0.2 * i, 0.0, 0.0, -0.9 + 0.2 * i, 1.0, 0.02);
+        add_box(fence, -1.0 + 0.2 * i, 0.0, 0.0, -0.9 + 0.2 * i, 1.0, 0.02);
     }
-    add_box(&block, -0.5, 0.0, 1.0, 0.5, 1.0, 2.0);
-    const vsh_mesh meshes[2] = {fence.mesh, block.mesh};
+    add_box(block, -0.5, 0.0, 1.0, 0.5, 1.0, 2.0);
+    const vsh_mesh meshes[2] = {shape_mesh(fence, "fence"), shape_mesh(block, "block")};
     const double voxels[3] = {0.12, 0.05, 0.012};
     for (int v = 0; v < 3; ++v) {
-        casting c = make(meshes, 2, voxels[v]);
+        FREED_BY(caster_free) casting c = make_of(meshes, 2, voxels[v]);
         vsh_lost lost[2];
         assert_ok(vsh_field_find_lost(c.field, meshes, 2, c.triangles, lost, &failure));
-        print_message("voxel %g: %.3f of the fence, %.3f of the block; thin %.4f\n", voxels[v], lost[0].share,
-                      lost[1].share, lost[0].thickness);
-        assert_true(lost[1].share < 0.005);
+        assert_less(lost[1].share, 0.005);
         if (v < 2) {
             assert_true(lost[0].share > 0.2 && lost[0].triangles > 0);
-            assert_true(fabs(lost[0].thickness - 0.02) < 0.001);
+            assert_less(fabs(lost[0].thickness - 0.02), 0.001);
         } else {
-            assert_true(lost[0].share < 0.005);
+            assert_less(lost[0].share, 0.005);
         }
-        caster_free(&c);
     }
 }
 
 TEST(voxels_coarser_than_casters_cost_exact_no_error) {
-    static shape slats, cards;
-    slats = cards = (shape){.mesh = {.vertex_count = 0}};
+    FREED shape *slats = shape_new(), *cards = shape_new();
     for (int i = 0; i < 10; ++i) {
-        add_box(&slats, -1.0 + 0.2 * i, 0.5, -1.0, -0.9 + 0.2 * i, 0.51, 1.0);
+        add_box(slats, -1.0 + 0.2 * i, 0.5, -1.0, -0.9 + 0.2 * i, 0.51, 1.0);
     }
     uint64_t counter = 1;
     for (int i = 0; i < 60; ++i) {
-        const float x = (float)between(&counter, -1.0, 1.0), y = (float)between(&counter, 0.5, 1.2),
-                    z = (float)between(&counter, -1.0, 1.0), t = (float)between(&counter, -0.1, 0.1);
-        const float card[4][3] = {{x - 0.1f, y, z - 0.1f},
-                                  {x + 0.1f, y + t, z - 0.1f},
-                                  {x + 0.1f, y + t, z + 0.1f},
-                                  {x - 0.1f, y, z + 0.1f}};
-        add_quad(&cards, card);
+        const double x = between(&counter, -1.0, 1.0), y = between(&counter, 0.5, 1.2),
+                     z = between(&counter, -1.0, 1.0), t = between(&counter, -0.1, 0.1);
+        const double card[4][3] = {{x - 0.1, y, z - 0.1},
+                                   {x + 0.1, y + t, z - 0.1},
+                                   {x + 0.1, y + t, z + 0.1},
+                                   {x - 0.1, y, z + 0.1}};
+        add_quad(cards, card);
     }
     const vsh_points points = board(1.0, 0.0);
-    const shape *const shapes[2] = {&slats, &cards};
+    const shape *const shapes[2] = {slats, cards};
     for (int which = 0; which < 2; ++which) {
         for (double voxel = 0.2; voxel > 0.02; voxel *= 0.5) {
-            casting c = make(&shapes[which]->mesh, 1, voxel);
+            FREED_BY(caster_free) casting c = make(shapes[which], voxel);
             vsh_shade_options options = vsh_shade_options_default();
             const double rmse = rmse_to_truth(&c, &points, &options);
-            print_message("%s, voxels of %g: %.4f\n", which ? "cards" : "slats", voxel, rmse);
-            assert_true(rmse <= 0.02);
-            caster_free(&c);
+            assert_at_most(rmse, 0.02);
         }
     }
 }
@@ -221,26 +189,23 @@ TEST(ao_between_texels_keeps_the_error_beside_what_is_low) {
     static const double VOXEL = 0.05, LIFT = 0.05 / 64; /* what AO's own rays begin at */
     static float plane[TEXELS], covered[TEXELS];
     static const float uvs[8] = {0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 1.0f, 0.0f, 1.0f};
-    static shape ground, low;
-    ground = low = (shape){.mesh = {.vertex_count = 0}};
-    const float quad[4][3] = {
-        {-1.0f, 0.0f, 1.0f}, {1.0f, 0.0f, 1.0f}, {1.0f, 0.0f, -1.0f}, {-1.0f, 0.0f, -1.0f}};
-    add_quad(&ground, quad);
-    ground.mesh.uvs = uvs;
+    FREED shape *ground = shape_new(), *low = shape_new();
+    add_quad(ground, (const double[4][3]){{-1, 0, 1}, {1, 0, 1}, {1, 0, -1}, {-1, 0, -1}});
     for (int i = 0; i < 12; ++i) {
         const double x = -0.95 + 0.16 * i;
-        add_box(&low, x, -0.005, -0.9, x + 0.03, 0.012, 0.9);
+        add_box(low, x, -0.005, -0.9, x + 0.03, 0.012, 0.9);
     }
-    const vsh_mesh meshes[2] = {ground.mesh, low.mesh};
-    casting c = make(meshes, 2, VOXEL);
+    vsh_mesh meshes[2] = {shape_mesh(ground, "ground"), shape_mesh(low, "slats")};
+    meshes[0].uvs = uvs;
+    FREED_BY(caster_free) casting c = make_of(meshes, 2, VOXEL);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
-    vsh_charts *charts = NULL;
-    vsh_texels *of = NULL;
-    assert_ok(vsh_charts_create(&ground.mesh, 1, &size, NULL, NULL, &charts, &failure));
+    OWNED(vsh_charts) *charts = NULL;
+    OWNED(vsh_texels) *of = NULL;
+    assert_ok(vsh_charts_create(meshes, 1, &size, NULL, NULL, &charts, &failure));
     assert_ok(vsh_texels_create(charts, NULL, &of, &failure));
     const vsh_texel_samples samples = vsh_texels_samples(of);
-    float *open = malloc(samples.count * sizeof *open);
+    FREED float *open = malloc(samples.count * sizeof *open);
     assert_ok(vsh_trace_ao(c.triangles, NULL, samples.count, samples.positions, samples.normals, LIFT, 0.5,
                            1024, NULL, open, &failure));
     vsh_shade_options options = vsh_shade_options_default();
@@ -255,14 +220,5 @@ TEST(ao_between_texels_keeps_the_error_beside_what_is_low) {
         sum += covered[at] > 0.0f ? off * off : 0.0;
         count += covered[at] > 0.0f;
     }
-    print_message("AO over %g texels beside low slats: %.4f\n", count, sqrt(sum / count));
     assert_true(count > 0.5 * TEXELS && sqrt(sum / count) <= 0.02);
-    free(open);
-    vsh_texels_free(of);
-    vsh_charts_free(charts);
-    caster_free(&c);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

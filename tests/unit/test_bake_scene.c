@@ -5,13 +5,16 @@
 /* Rows come 64 at a time. */
 enum { SIZE = 384, LIMIT = 4 << 20 };
 
-/* Rows as they come. */
 typedef struct received {
     float *values; /* [channels][SIZE][SIZE] */
     char names[16][VSH_CHANNEL_NAME];
     int32_t channels, rows;
     int calls, fail_at; /* fail_at: the call that fails; 0: none */
 } received;
+
+static void free_received(received *t) {
+    free(t->values);
+}
 
 static vsh_result add_rows(void *user, const vsh_scene_lightmap *lightmap, const vsh_image *image,
                            int32_t first, int32_t count, const float *const *planes, vsh_error *error) {
@@ -60,11 +63,11 @@ TEST(rows_of_a_callback_are_those_of_the_file) {
     assert_int_equal(report.lightmap_count, 1);
     assert_ptr_equal(report.errors, errors);
     assert_true(report.occluders.active_voxels > 0 && report.shade.marches > 0);
-    received t = {.fail_at = 0};
+    FREED_BY(free_received) received t = {.fail_at = 0};
     assert_ok(bake_into(&c, NULL, NULL, &t, &failure));
     assert_int_equal(t.rows, SIZE);
     assert_int_equal(t.channels, 6);
-    vsh_image_file *file;
+    OWNED(vsh_image_file) *file = NULL;
     assert_ok(vsh_image_read(c.output, NULL, &file, &failure));
     const vsh_image image = vsh_image_view(file);
     for (int32_t k = 0; k < t.channels; ++k) {
@@ -83,8 +86,6 @@ TEST(rows_of_a_callback_are_those_of_the_file) {
         told += strcmp(attributes[i].name, "vdbshade_shadow") == 0;
     }
     assert_int_equal(told, 1);
-    vsh_image_free(file);
-    free(t.values);
 }
 
 /* The ball stands in the floor, so that some texels are invalid, over several tiles. */
@@ -103,6 +104,7 @@ TEST(threads_and_memory_limits_change_no_bit) {
         c.scene.shade.ao_method = cases[i].ao_method;
         c.scene.shade.rays = 32;
         vsh_run run = vsh_run_default();
+        FREED_BY(free_received)
         received one = {.fail_at = 0}, more = {.fail_at = 0}, limited = {.fail_at = 0}, none = {.fail_at = 0};
         run.threads = 1;
         assert_ok(bake_into(&c, NULL, &run, &one, &failure));
@@ -116,20 +118,16 @@ TEST(threads_and_memory_limits_change_no_bit) {
         assert_memory_equal(one.values, limited.values, bytes);
         /* the folder is needed */
         assert_int_equal(bake_into(&c, at("missing"), &run, &none, &failure), VSH_ERROR_WRITE);
-        free(one.values);
-        free(more.values);
-        free(limited.values);
     }
 }
 
 TEST(an_error_of_the_callback_ends_the_bake) {
     case_scene c;
     fill(&c, SIZE, 1.0);
-    received t = {.fail_at = 2};
+    FREED_BY(free_received) received t = {.fail_at = 2};
     assert_int_equal(bake_into(&c, NULL, NULL, &t, &failure), VSH_ERROR_WRITE);
     assert_string_equal(failure.message, "the disk is full");
     assert_int_equal(t.calls, 2);
-    free(t.values);
 }
 
 /* The lightmaps that `loaded` is called with. */
@@ -202,6 +200,4 @@ TEST(lightmaps_of_objects_have_their_names) {
     }
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

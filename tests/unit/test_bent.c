@@ -43,7 +43,7 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.tangents = ask->tangents;
-    vsh_charts *texels = NULL;
+    OWNED(vsh_charts) *texels = NULL;
     assert_ok(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, &failure));
     vsh_shade_options shade = preview_options();
     shade.ao_method = ask->ao_method;
@@ -65,7 +65,6 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into, vs
     const vsh_result result =
         vsh_bake_lightmap(occluders_with(field, ask->layer, ask->layer != NULL), texels, &light,
                           ask->light ? 1 : 0, &shade, NULL, &lightmap, NULL, error);
-    vsh_charts_free(texels);
     return result;
 }
 
@@ -88,8 +87,8 @@ enum { METHOD_COUNT = 3 };
 
 /* Under an open sky nothing bends, and every direction is unit. */
 TEST(test_open) {
-    vsh_field *field = floor_field(false);
-    baked *b = malloc(sizeof *b);
+    OWNED(vsh_field) *field = floor_field(false);
+    FREED baked *b = malloc(sizeof *b);
     const double up[3] = {0.0, 1.0, 0.0}, out[3] = {0.0, 0.0, 1.0};
     for (int m = 0; m < METHOD_COUNT; ++m) {
         for (int32_t space = VSH_BENT_WORLD; space <= VSH_BENT_TANGENT; ++space) {
@@ -102,14 +101,12 @@ TEST(test_open) {
             }
         }
     }
-    free(b);
-    vsh_field_free(field);
 }
 
 /* At the foot of a high and long wall half of the sky is open. Of a cosine-weighted hemisphere the half
  * towards +x has the mean (2 / (3 π), 1 / 3) along x and up. */
 TEST(test_wall) {
-    vsh_field *field = floor_field(true);
+    OWNED(vsh_field) *field = floor_field(true);
     const double position[3] = {-0.42, 0.001, 0.0};
     const float normal[3] = {0.0f, 1.0f, 0.0f};
     const double truth[3] = {2.0 / (3.0 * PI), 1.0 / 3.0, 0.0};
@@ -131,13 +128,12 @@ TEST(test_wall) {
         assert_int_equal(bits_of(alone), bits_of(ao));
         assert_int_equal(bits_of(its_deviation), bits_of(deviation));
     }
-    vsh_field_free(field);
 }
 
 /* The same directions in both spaces; a chart that is mirrored mirrors x, and keeps y along growing v. */
 TEST(test_spaces) {
-    vsh_field *field = floor_field(true);
-    baked *world = malloc(sizeof *world), *tangent = malloc(sizeof *tangent);
+    OWNED(vsh_field) *field = floor_field(true);
+    FREED baked *world = malloc(sizeof *world), *tangent = malloc(sizeof *tangent);
     const float *const uvs[2] = {UVS, MIRRORED};
     for (int mirror = 0; mirror < 2; ++mirror) {
         asked ask = {.uvs = uvs[mirror], .ao_method = VSH_AO_CONES, .bent = true};
@@ -155,18 +151,15 @@ TEST(test_spaces) {
         assert_true(most < 0.05);
         assert_true(bends > 0.4);
     }
-    free(world);
-    free(tangent);
-    vsh_field_free(field);
 }
 
 /* A wall in a layer bends as one in the field does: what it hides is behind nothing else. */
 TEST(test_layer) {
-    vsh_field *united = floor_field(true), *ground = floor_field(false);
-    vsh_field *wall = field_of((truth_scene){&WALL, 1}, 0.04, 4.0);
+    OWNED(vsh_field) *united = floor_field(true), *ground = floor_field(false);
+    OWNED(vsh_field) *wall = field_of((truth_scene){&WALL, 1}, 0.04, 4.0);
     vsh_layer layer = vsh_layer_default();
     layer.field = wall;
-    baked *a = malloc(sizeof *a), *b = malloc(sizeof *b);
+    FREED baked *a = malloc(sizeof *a), *b = malloc(sizeof *b);
     const asked ask = {.ao_method = VSH_AO_CONES, .bent = true},
                 layered = {.ao_method = VSH_AO_CONES, .bent = true, .layer = &layer};
     bake_well(united, &ask, a);
@@ -178,16 +171,11 @@ TEST(test_layer) {
             assert_true(degrees_between(b->bent + 3 * i, d) < 4.0);
         }
     }
-    free(a);
-    free(b);
-    vsh_field_free(united);
-    vsh_field_free(ground);
-    vsh_field_free(wall);
 }
 
 TEST(test_tint_and_ambient) {
-    vsh_field *field = floor_field(true);
-    baked *plain = malloc(sizeof *plain), *b = malloc(sizeof *b);
+    OWNED(vsh_field) *field = floor_field(true);
+    FREED baked *plain = malloc(sizeof *plain), *b = malloc(sizeof *b);
     const double ambient[3] = {0.25, 0.5, 1.0};
     asked ask = {.ao_method = VSH_AO_CONES, .light = true};
     bake_well(field, &ask, plain);
@@ -219,14 +207,11 @@ TEST(test_tint_and_ambient) {
         assert_float_equal(rgb[3 + c], pow(0.5, powers.power[c]), 1e-6);
         assert_float_equal(rgb[6 + c], 1.0, 0.0);
     }
-    free(plain);
-    free(b);
-    vsh_field_free(field);
 }
 
 TEST(test_refused) {
-    vsh_field *field = floor_field(false);
-    baked *b = malloc(sizeof *b);
+    OWNED(vsh_field) *field = floor_field(false);
+    FREED baked *b = malloc(sizeof *b);
     const double dark[3] = {0.0, -1.0, 0.0};
     const struct {
         asked ask;
@@ -248,10 +233,4 @@ TEST(test_refused) {
         assert_int_equal(bake(field, &cases[i].ask, b, &failure), VSH_ERROR_ARGUMENT);
         assert_string_equal(failure.message, cases[i].message);
     }
-    free(b);
-    vsh_field_free(field);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

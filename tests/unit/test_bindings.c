@@ -20,12 +20,17 @@ static int32_t listen(void *user, const char *stage, double fraction) {
     return h->answer;
 }
 
-TEST(progress_is_handed_on_at_both_ends_and_seldom_between) {
-    heard h = {0, 0, 0.0, pthread_self()};
+static vsh_progress_filter filter_to(heard *h, double seconds) {
     vsh_progress_filter filter = vsh_progress_filter_default();
     filter.progress = listen;
-    filter.user = &h;
-    filter.seconds = 1e6;
+    filter.user = h;
+    filter.seconds = seconds;
+    return filter;
+}
+
+TEST(progress_is_handed_on_at_both_ends_and_seldom_between) {
+    heard h = {0, 0, 0.0, pthread_self()};
+    vsh_progress_filter filter = filter_to(&h, 1e6);
     for (int i = 0; i <= 1000; ++i) {
         assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.001 * i), 0);
     }
@@ -41,9 +46,7 @@ TEST(progress_is_handed_on_at_both_ends_and_seldom_between) {
 
 TEST(an_answer_stays) {
     heard h = {0, 7, 0.0, pthread_self()};
-    vsh_progress_filter filter = vsh_progress_filter_default();
-    filter.progress = listen;
-    filter.user = &h;
+    vsh_progress_filter filter = filter_to(&h, vsh_progress_filter_default().seconds);
     assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.0), 7);
     assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 7);
     assert_int_equal(h.calls, 1);
@@ -58,10 +61,7 @@ static void *tell(void *filter) {
 
 TEST(one_thread_alone_hands_on) {
     heard h = {0, 0, 0.0, pthread_self()};
-    vsh_progress_filter filter = vsh_progress_filter_default();
-    filter.progress = listen;
-    filter.user = &h;
-    filter.seconds = 0.0;
+    vsh_progress_filter filter = filter_to(&h, 0.0);
     filter.thread = (uint64_t)pthread_self();
     pthread_t other;
     assert_int_equal(pthread_create(&other, NULL, tell, &filter), 0);
@@ -73,7 +73,6 @@ TEST(one_thread_alone_hands_on) {
 }
 
 static double ring(void *user, const double p[3]) {
-    (void)user;
     return hypot(hypot(p[0], p[2]) - 0.7, p[1]) - 0.25;
 }
 
@@ -115,8 +114,4 @@ TEST(without_a_callback_there_is_none) {
     assert_null(grid);
     assert_int_equal(vsh_grid_from_distances(NULL, rings, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_grid_from_distances(&field, rings, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

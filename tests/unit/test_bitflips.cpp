@@ -148,14 +148,13 @@ Tally run_sample(const Sample &sample, int count, uint64_t first) {
     std::string bytes = content(path);
     bytes.replace(bytes.find(OTHER), std::strlen(CLASS), CLASS);
     put(path, bytes);
-    vsh_grid *sound = nullptr;
+    OWNED(vsh_grid) *sound = nullptr;
     assert_int_equal(vsh_grid_read(path.c_str(), nullptr, nullptr, &sound, &failure), VSH_OK);
     Tally tally;
     for (int i = 0; i < count; ++i) {
         put(damaged, mutate(bytes, first + uint64_t(i)));
         run_one(damaged, sound, tally);
     }
-    vsh_grid_free(sound);
     return tally;
 }
 

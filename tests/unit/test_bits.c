@@ -110,11 +110,10 @@ static vsh_light spot(void) {
 }
 
 static void add_leaves(bits *b, const vsh_grid *grid) {
-    leaves all = leaves_of(grid);
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
     for (size_t i = 0; i < all.count; ++i) {
         add_floats(b, all.leaf[i].values, 512);
     }
-    free(all.leaf);
 }
 
 /* --- the parts */
@@ -128,12 +127,10 @@ typedef struct context {
 } context;
 
 static void level_set_of_solids(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     add_leaves(b, c->grid);
 }
 
 static void field_samples(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     float distance[POINTS];
     vsh_field_sample(c->field, POINTS, positions, distance);
     for (size_t i = 0; i < POINTS; ++i) {
@@ -229,7 +226,6 @@ static void bent_normals(const context *c, int32_t method, bits *b) {
 }
 
 static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     float value[POINTS], rgb[3 * POINTS] = {0.0f}, tinted[3 * POINTS];
     const vsh_points points = {POINTS, positions, normals, texels};
     const vsh_light light = spot();
@@ -272,7 +268,6 @@ static void lightmap(const context *c, int32_t method, bits *b) {
 
 /* Noise on a square in two charts, one of them turned, in an image of 48 × 48. */
 static void seams(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     const vsh_run *run = &c->run;
     static const float corners[24] = {0, 0, 0, 1, 0, 0, 1, 2, 0, 0, 2, 0, 1, 0, 0, 2, 0, 0, 2, 2, 0, 1, 2, 0};
     static const float uvs[16] = {0.05f, 0.07f, 0.37f, 0.07f, 0.37f, 0.81f, 0.05f, 0.81f,
@@ -300,9 +295,8 @@ static void seams(const context *c, int32_t unused, bits *b) {
 }
 
 static void volume_of_band(const context *c, int32_t unused, bits *b) {
-    (void)unused;
-    vsh_voxels *voxels = NULL;
-    vsh_volume *volume = NULL;
+    OWNED(vsh_voxels) *voxels = NULL;
+    OWNED(vsh_volume) *volume = NULL;
     vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.75;
@@ -310,7 +304,7 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
     assert_ok(vsh_voxels_from_grid(c->grid, 0.0, &c->run, &voxels, &failure));
     assert_ok(vsh_bake_volume(occluders_of(c->field), voxels, &light, 1, &options, &c->run, &volume, NULL,
                               &failure));
-    float *values = malloc(48 * 48 * 48 * sizeof *values);
+    FREED float *values = malloc(48 * 48 * 48 * sizeof *values);
     assert_non_null(values);
     const int32_t low[3] = {-24, -8, -24}, size[3] = {48, 48, 48};
     for (size_t grid = 0; grid < 2; ++grid) {
@@ -323,14 +317,11 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
             add_floats(b, along, 48);
         }
     }
-    free(values);
-    vsh_volume_free(volume);
-    vsh_voxels_free(voxels);
 }
 
 /* Casters without voxels, as the one layer beside an empty field. */
 static void shade_layer(const context *c, const vsh_heights *heights, const vsh_spheres *spheres, bits *b) {
-    vsh_field *empty = NULL;
+    OWNED(vsh_field) *empty = NULL;
     assert_ok(vshi_field_create_empty(0.0625, &empty, &failure));
     vsh_layer layer = vsh_layer_default();
     layer.heights = heights;
@@ -343,7 +334,6 @@ static void shade_layer(const context *c, const vsh_heights *heights, const vsh_
         shade(&here, &lights[i], &options, b);
     }
     shade(&here, NULL, &options, b);
-    vsh_field_free(empty);
 }
 
 enum { COLUMNS = 33 };
@@ -359,25 +349,21 @@ static vsh_heights_source hills(void) {
 }
 
 static void heightfield(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     const vsh_heights_source source = hills();
-    vsh_heights *heights = NULL;
+    OWNED(vsh_heights) *heights = NULL;
     assert_ok(vsh_heights_create(&source, &c->run, &heights, &failure));
     shade_layer(c, heights, NULL, b);
-    vsh_heights_free(heights);
 }
 
 static void spheres(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     double list[4 * 60];
     uint64_t counter = 9;
     for (size_t i = 0; i < sizeof list / sizeof list[0]; ++i) {
         list[i] = i % 4 == 3 ? 0.05 + 0.2 * random_unit(&counter) : -2.0 + 4.0 * random_unit(&counter);
     }
-    vsh_spheres *made = NULL;
+    OWNED(vsh_spheres) *made = NULL;
     assert_ok(vsh_spheres_create(list, 60, NULL, &c->run, &made, &failure));
     shade_layer(c, NULL, made, b);
-    vsh_spheres_free(made);
 }
 
 static void flat_map(const context *c, int32_t method, bits *b) {
@@ -385,7 +371,7 @@ static void flat_map(const context *c, int32_t method, bits *b) {
     static const double points[] = {-0.5, -0.5, 0.25, -0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 0.5, 0.625, 0.875};
     static const size_t counts[] = {3, 3};
     static float planes[5][TEXELS];
-    vsh_outline *outline = NULL;
+    OWNED(vsh_outline) *outline = NULL;
     assert_ok(vsh_outline_from_polygons(points, counts, 2, &c->run, &outline, &failure));
     vsh_flat_options options = vsh_flat_options_default();
     options.width = options.height = SIZE;
@@ -398,11 +384,9 @@ static void flat_map(const context *c, int32_t method, bits *b) {
     const vsh_flat_map map = {shadows, rgb, planes[4]};
     assert_ok(vsh_flat_bake(outline, &light, 1, &options, &c->run, &map, &failure));
     add_floats(b, planes[0], 5 * TEXELS);
-    vsh_outline_free(outline);
 }
 
 static void picture(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     enum { WIDE = 48, HIGH = 32, PIXELS = WIDE * HIGH };
     static float color[3 * PIXELS], alpha[PIXELS], depth[PIXELS], normal[3 * PIXELS], encoded[3][PIXELS];
     const vsh_picture made = {color, alpha, depth, normal};
@@ -441,36 +425,30 @@ static vsh_model *cloister(const vsh_run *run, vsh_mesh meshes[MOST_MESHES], siz
 }
 
 static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     vsh_mesh meshes[MOST_MESHES];
     size_t count;
-    vsh_model *model = cloister(&c->run, meshes, &count);
+    OWNED(vsh_model) *model = cloister(&c->run, meshes, &count);
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 96;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_meshes(meshes, count, &options, &c->run, &grid, &failure));
     add_leaves(b, grid);
-    vsh_grid_free(grid);
-    vsh_model_free(model);
 }
 
 /* Charts of the asset: of no library, but for the file. */
 static void atlas_of_a_mesh(const context *c, int32_t unused, bits *b) {
-    (void)unused;
     vsh_mesh meshes[MOST_MESHES];
     size_t count;
-    vsh_model *model = cloister(&c->run, meshes, &count);
+    OWNED(vsh_model) *model = cloister(&c->run, meshes, &count);
     vsh_unwrap_options options = vsh_unwrap_options_default();
     options.width = options.height = 512;
     options.padding = 2;
-    vsh_atlas *atlas = NULL;
+    OWNED(vsh_atlas) *atlas = NULL;
     assert_ok(vsh_unwrap(meshes, count, &options, &c->run, &atlas, &failure));
     for (size_t i = 0; i < count; ++i) {
         const vsh_atlas_mesh mesh = vsh_atlas_mesh_view(atlas, i);
         add_floats(b, mesh.uvs, 2 * mesh.vertex_count);
     }
-    vsh_atlas_free(atlas);
-    vsh_model_free(model);
 }
 
 /* Holes of a repeated picture all over a mesh, seen from above; *uvs is to be freed. */
@@ -503,8 +481,8 @@ static void exact(const context *c, int32_t what, bits *b) {
     vsh_alpha_mask mask;
     float *uvs = NULL;
     const vsh_heights_source source = hills();
-    vsh_model *model = NULL;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     vsh_triangles *triangles = NULL;
     context here = {.run = c->run};
     assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &failure));
@@ -526,8 +504,6 @@ static void exact(const context *c, int32_t what, bits *b) {
     free(uvs);
     vsh_triangles_free(triangles);
     vsh_field_free(here.field);
-    vsh_grid_free(grid);
-    vsh_model_free(model);
 }
 
 /* --- the table */

@@ -80,11 +80,10 @@ static stage *make_stage(int shape, bool ao, double voxel) {
         }
     }
     const vsh_grid_options options = with_voxel(voxel);
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_meshes(s->meshes, s->mesh_count, &options, NULL, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
     assert_ok(vsh_triangles_create(s->meshes, s->mesh_count, NULL, &s->triangles, &failure));
-    vsh_grid_free(grid);
     return s;
 }
 
@@ -253,8 +252,8 @@ static outcome try(const stage *s, const trial *t) {
     options.shade.start_offset = 0.0;
     options.ao_spacing = vsh_lightmap_options_default().ao_spacing;
     vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
-    vsh_charts *charts = create(&floor.mesh, 1, options, NULL);
-    vsh_texels *texels = rasterize(charts);
+    OWNED(vsh_charts) *charts = create(&floor.mesh, 1, options, NULL);
+    OWNED(vsh_texels) *texels = rasterize(charts);
     const vsh_texel_samples all = vsh_texels_samples(texels);
     outcome o = {0};
     vsh_result result = VSH_OK;
@@ -304,8 +303,6 @@ static outcome try(const stage *s, const trial *t) {
     o.measured = sqrt(sum / (double)all.count);
     o.inside = sqrt(within / fmax(1.0, inside));
     o.rays /= (double)all.count;
-    vsh_texels_free(texels);
-    vsh_charts_free(charts);
     return o;
 }
 

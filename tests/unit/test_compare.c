@@ -5,13 +5,16 @@
 enum { WIDTH = 40, HEIGHT = 25, COUNT = WIDTH * HEIGHT };
 
 static double wavy(const void *user, double x, double y, double z) {
-    (void)user;
-    (void)z;
     return 0.5 + 0.3 * sin(0.4 * x) * cos(0.3 * y) + 0.1 * noise((uint32_t)(y * WIDTH + x));
+}
+
+static plane waves(void) {
+    return make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
 }
 
 TEST(differences_are_summed_as_their_formulas_say) {
     const double half = 0.5;
+    FREED_BY(free_plane)
     plane golden = make_plane(WIDTH, HEIGHT, 1, flat, &half),
           values = make_plane(WIDTH, HEIGHT, 1, flat, &half);
     for (size_t i = 0; i < 30; ++i) { /* 30 of 1000 values are off, by 1/64 to 30/64 */
@@ -29,11 +32,10 @@ TEST(differences_are_summed_as_their_formulas_say) {
     assert_int_equal(m.worst, 31 * 29 + 7);
     assert_true(m.worst_value[0] == 0.5 && m.worst_value[1] == 0.5 + 30.0 / 64.0);
     assert_true(m.value[VSH_MEASURE_P99] == 20.0 / 64.0); /* ten of the thousand are larger */
-    free(golden.values);
-    free(values.values);
 }
 
 TEST(masked_values_count_for_nothing) {
+    FREED_BY(free_plane)
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
           values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     uint8_t mask[COUNT];
@@ -47,11 +49,10 @@ TEST(masked_values_count_for_nothing) {
     assert_true(m.value[VSH_MEASURE_LOST] == 0.0 && m.value[VSH_MEASURE_SHIFT] == 0.0);
     const vsh_limits limits = vsh_limits_default();
     assert_int_equal(vsh_compare_judge(&m, &limits), 0);
-    free(golden.values);
-    free(values.values);
 }
 
 TEST(values_past_one_are_taken_by_the_largest_golden_one) {
+    FREED_BY(free_plane)
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
           values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     for (size_t i = 0; i < COUNT; ++i) {
@@ -66,8 +67,6 @@ TEST(values_past_one_are_taken_by_the_largest_golden_one) {
     const vsh_measures eight = measure(&golden, &values, NULL);
     assert_true(eight.range == 8.0);
     assert_memory_equal(one.value, eight.value, sizeof one.value);
-    free(golden.values);
-    free(values.values);
 }
 
 /* --- what never passes */
@@ -79,6 +78,7 @@ TEST(a_value_that_is_not_finite_never_passes) {
     }
     const float bad[] = {NAN, INFINITY, -INFINITY};
     for (size_t k = 0; k < 12; ++k) {
+        FREED_BY(free_plane)
         plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
               values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
         plane *one = k % 2 == 0 ? &golden : &values;
@@ -93,19 +93,16 @@ TEST(a_value_that_is_not_finite_never_passes) {
         assert_int_equal(m.count, COUNT - 2);
         assert_true(m.value[VSH_MEASURE_RMSE] == 0.0);
         assert_int_equal(vsh_compare_judge(&m, &limits), 1 << VSH_MEASURE_NONFINITE);
-        free(golden.values);
-        free(values.values);
     }
 }
 
 TEST(nothing_compared_is_nothing_held) {
-    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    FREED_BY(free_plane) plane golden = waves();
     uint8_t mask[COUNT] = {0};
     const vsh_measures m = measure(&golden, &golden, mask);
     const vsh_limits limits = vsh_limits_default();
     assert_int_equal(m.count, 0);
     assert_true(vsh_compare_judge(&m, &limits) != 0);
-    free(golden.values);
 }
 
 TEST(each_measure_is_held_to_its_own_limit) {
@@ -149,6 +146,7 @@ TEST(coverage_is_counted_and_becomes_a_mask) {
 /* --- calls */
 
 TEST(the_same_bits_for_any_number_of_threads) {
+    FREED_BY(free_plane)
     plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
           values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
     for (uint32_t i = 0; i < COUNT; ++i) {
@@ -164,18 +162,15 @@ TEST(the_same_bits_for_any_number_of_threads) {
         assert_ok(vsh_compare(&c, NULL, &run, &other, &failure));
         assert_memory_equal(&first, &other, sizeof first);
     }
-    free(golden.values);
-    free(values.values);
 }
 
 static int32_t stop(void *user, const char *stage, double fraction) {
-    (void)fraction;
     *(int *)user += strcmp(stage, "compare") == 0;
     return 1;
 }
 
 TEST(bad_calls_are_refused_by_name) {
-    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
+    FREED_BY(free_plane) plane golden = waves();
     const vsh_compared good = pair_of(&golden, &golden, NULL);
     vsh_measures m;
     const struct {
@@ -198,16 +193,12 @@ TEST(bad_calls_are_refused_by_name) {
     }
     assert_int_equal(vsh_compare(NULL, NULL, NULL, &m, NULL), VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_compare(&good, NULL, NULL, NULL, NULL), VSH_ERROR_ARGUMENT);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = COUNT * 20;
+    vsh_run run = run_within(COUNT * 20);
     assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_LIMIT);
     int asked = 0;
-    run = vsh_run_default();
-    run.progress = stop;
-    run.user = &asked;
+    run = run_watched(stop, &asked);
     assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_CANCELLED);
     assert_int_equal(asked, 1);
-    free(golden.values);
 }
 
 /* --- Displacements: one is told where it is seen, and none along edges that tell nothing of it. */
@@ -225,7 +216,6 @@ typedef struct straight {
 
 static double straight_at(const void *user, double x, double y, double z) {
     const straight *e = user;
-    (void)z;
     const double up = y - 48.1 - e->moved - e->slope * (x - 47.3);
     return fmin(1.0, fmax(0.0, 0.5 + up / sqrt(1.0 + e->slope * e->slope) / e->width));
 }
@@ -269,7 +259,6 @@ TEST(what_planes_in_space_do_not_tell_is_no_displacement) {
 static double tall_at(const void *user, double x, double y, double z) {
     const double lean = *(const double *)user, width = 0.6 + 0.02 * y;
     const double middle = 48.2 + (0.0175 + lean) * y;
-    (void)z;
     return 0.5 + 0.5 * tanh((fabs(x - middle) - 10.1) / width);
 }
 
@@ -286,7 +275,6 @@ TEST(a_sun_that_hardly_moved_is_alike) {
 
 static double long_at(const void *user, double x, double y, double z) {
     const double moved = *(const double *)user;
-    (void)z;
     return 0.5 + 0.5 * tanh(fmax(fabs(x - 48.0 - moved) - 30.0, fabs(y - 44.0) - 5.0) / 1.5);
 }
 
@@ -300,8 +288,6 @@ TEST(a_shadow_six_times_as_long_as_wide_is_seen_to_move_along_itself) {
 /* A ramp at the left border, and a soft edge; both move by three texels. */
 static double border_at(const void *user, double x, double y, double z) {
     const double at = x - *(const double *)user;
-    (void)y;
-    (void)z;
     return 0.5 + 0.5 * tanh((at - 60.0) / 6.0) - 0.5 * fmax(0.0, (8.0 - at) / 8.0);
 }
 
@@ -318,8 +304,4 @@ TEST(what_comes_from_outside_is_not_explained) {
     assert_near(m.shift[0], -3.0, 0.01);
     assert_near(m.explained, inside / all, 0.02);
     assert_true(inside / all < 0.9);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -5,14 +5,12 @@
 static char path[64];
 
 static int make_file(void **state) {
-    (void)state;
     strcpy(path, "tolerances-XXXXXX");
     const int file = mkstemp(path);
     return file < 0 || close(file) != 0;
 }
 
 static int remove_file(void **state) {
-    (void)state;
     return unlink(path);
 }
 
@@ -25,11 +23,10 @@ static vsh_result read_text(const char *text, vsh_tolerances **tolerances, vsh_e
 }
 
 static vsh_limits limits_of(const char *text, const char *channel, double *coverage) {
-    vsh_tolerances *tolerances = NULL;
+    OWNED(vsh_tolerances) *tolerances = NULL;
     assert_ok(read_text(text, &tolerances, &failure));
     vsh_limits limits = vsh_limits_default();
     vsh_tolerances_apply(tolerances, channel, &limits, coverage);
-    vsh_tolerances_free(tolerances);
     return limits;
 }
 
@@ -183,6 +180,4 @@ TEST(two_files_are_compared_channel_by_channel) {
     assert_int_equal(unlink(golden), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_file, remove_file);
-}
+FIXTURE(make_file, remove_file)

@@ -24,7 +24,6 @@ static const picture usual = {14.0, 5.0, 0.0, 4};
 static double picture_at(const void *user, double x, double y, double z) {
     const picture *p = user;
     double lit = 1.0;
-    (void)z;
     for (int i = 0; i < p->shadows; ++i) {
         const double dx = x - 32.0 - 64.0 * (i % 2) - p->shift, dy = y - 32.0 - 64.0 * (double)(i / 2);
         lit = fmin(lit, 0.5 + (sqrt(dx * dx + dy * dy) - p->radius) / p->soft);
@@ -145,6 +144,7 @@ TEST(a_curve_over_the_values_is_no_change_of_a_shadow) {
 /* Texels of a patch that got lighter by so much. */
 static double lost_by(double off, double allowed) {
     const double grey = 0.5;
+    FREED_BY(free_plane)
     plane golden = make_plane(SIDE, SIDE, 1, flat, &grey), values = make_plane(SIDE, SIDE, 1, flat, &grey);
     for (size_t i = 0; i < 9; ++i) {
         values.values[(40 + i / 3) * SIDE + 50 + i % 3] += (float)off;
@@ -154,8 +154,6 @@ static double lost_by(double off, double allowed) {
     const vsh_compared c = pair_of(&golden, &values, NULL);
     vsh_measures m;
     assert_ok(vsh_compare(&c, &options, NULL, &m, &failure));
-    free(golden.values);
-    free(values.values);
     return m.value[VSH_MEASURE_LOST];
 }
 
@@ -181,7 +179,7 @@ TEST(limits_are_widened_as_documented) {
 }
 
 TEST(noise_is_a_share_of_the_range) {
-    plane golden = make_plane(SIDE, SIDE, 1, picture_at, &usual);
+    FREED_BY(free_plane) plane golden = make_plane(SIDE, SIDE, 1, picture_at, &usual);
     const vsh_compared c = pair_of(&golden, &golden, NULL);
     const double wrong[] = {-1e-9, 1.001, NAN, INFINITY};
     for (size_t i = 0; i < sizeof wrong / sizeof wrong[0]; ++i) {
@@ -190,7 +188,6 @@ TEST(noise_is_a_share_of_the_range) {
         vsh_measures m;
         assert_fails(vsh_compare(&c, &options, NULL, &m, &failure), VSH_ERROR_ARGUMENT, "noise of");
     }
-    free(golden.values);
 }
 
 /* --- values that hardly reach a mark: dark, a plateau that nearly is light from 20 to 100, dark, light from
@@ -202,16 +199,13 @@ typedef struct step {
 
 static double step_at(const void *user, double x, double y, double z) {
     const step *s = user;
-    (void)y;
-    (void)z;
     return x < 20.0 ? 0.0 : x < 100.0 ? s->plateau + s->slope * (x - 60.0) / 40.0 : x < 110.0 ? 0.0 : 1.0;
 }
 
 static vsh_measures compare_steps(step golden, step values) {
+    FREED_BY(free_plane)
     plane a = make_plane(SIDE, SIDE, 1, step_at, &golden), b = make_plane(SIDE, SIDE, 1, step_at, &values);
     const vsh_measures m = measure(&a, &b, NULL);
-    free(a.values);
-    free(b.values);
     return m;
 }
 
@@ -220,8 +214,4 @@ TEST(a_width_that_hangs_on_the_mark_is_not_measured) {
     const vsh_measures m = compare_steps(crawls, crawls), sharp = compare_steps(jumps, jumps);
     assert_int_equal(m.pairs, 2 * SIDE); /* not the one from 19 to 60 */
     assert_int_equal(sharp.pairs, 3 * SIDE);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

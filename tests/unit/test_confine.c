@@ -59,7 +59,6 @@ TEST(a_missing_reader_is_an_error_that_says_how_to_do_without) {
 /* --- what is read in this process */
 
 static int32_t cancel_later(void *user, const char *stage, double fraction) {
-    (void)stage;
     double *seen = user;
     *seen = fraction;
     return fraction > 0.2;
@@ -73,26 +72,27 @@ TEST(spheres_are_cancelled_within_a_file_of_any_size) {
     assert_int_equal(fclose(file), 0);
     double seen = 0.0, *spheres;
     size_t count;
-    vsh_run run = vsh_run_default();
-    run.progress = cancel_later;
-    run.user = &seen;
+    vsh_run run = run_watched(cancel_later, &seen);
     assert_int_equal(vsh_spheres_read(at("spheres.csv"), &run, &spheres, &count, &failure),
                      VSH_ERROR_CANCELLED);
     assert_null(spheres);
     assert_true(seen > 0.2 && seen < 0.5);
 }
 
+/* Of zeros, which take no room on the disk. */
+static void make_large(const char *name, off_t size) {
+    FILE *file = fopen(at(name), "wb");
+    assert_int_equal(ftruncate(fileno(file), size), 0);
+    assert_int_equal(fclose(file), 0);
+}
+
 static int32_t cancel_soon(void *user, const char *stage, double fraction) {
-    (void)stage;
-    (void)fraction;
     int *calls = user;
     return ++*calls > 10;
 }
 
 TEST(a_line_of_no_end_is_refused) {
-    FILE *file = fopen(at("zeros.csv"), "wb");
-    assert_int_equal(ftruncate(fileno(file), (off_t)1 << 34), 0); /* takes many seconds to read */
-    assert_int_equal(fclose(file), 0);
+    make_large("zeros.csv", (off_t)1 << 34); /* takes many seconds to read */
     double *spheres;
     size_t count;
     assert_int_equal(vsh_spheres_read(at("zeros.csv"), NULL, &spheres, &count, &failure), VSH_ERROR_INPUT);
@@ -101,9 +101,7 @@ TEST(a_line_of_no_end_is_refused) {
 }
 
 TEST(a_file_of_spheres_past_every_measure_is_a_limit) {
-    FILE *file = fopen(at("sparse.csv"), "wb");
-    assert_int_equal(ftruncate(fileno(file), ((off_t)1 << 34) + 1), 0);
-    assert_int_equal(fclose(file), 0);
+    make_large("sparse.csv", ((off_t)1 << 34) + 1);
     double *spheres;
     size_t count;
     assert_fails(vsh_spheres_read(at("sparse.csv"), NULL, &spheres, &count, &failure), VSH_ERROR_LIMIT,
@@ -111,9 +109,7 @@ TEST(a_file_of_spheres_past_every_measure_is_a_limit) {
 }
 
 TEST(hashing_is_cancelled_within_a_file) {
-    FILE *file = fopen(at("large.bin"), "wb");
-    assert_int_equal(ftruncate(fileno(file), (off_t)1 << 36), 0); /* takes minutes to hash */
-    assert_int_equal(fclose(file), 0);
+    make_large("large.bin", (off_t)1 << 36); /* takes minutes to hash */
     char path[256];
     snprintf(path, sizeof path, "%s", at("large.bin"));
     const char *const files[] = {path};
@@ -121,9 +117,7 @@ TEST(hashing_is_cancelled_within_a_file) {
     source.files = files;
     source.file_count = 1;
     int calls = 0;
-    vsh_run run = vsh_run_default();
-    run.progress = cancel_soon;
-    run.user = &calls;
+    vsh_run run = run_watched(cancel_soon, &calls);
     vsh_provenance *made;
     assert_int_equal(vsh_provenance_create(&source, &run, &made, &failure), VSH_ERROR_CANCELLED);
     assert_null(made);
@@ -134,12 +128,10 @@ TEST(hashing_is_cancelled_within_a_file) {
 }
 
 static int make_folder(void **state) {
-    (void)state;
     return mkdtemp(folder) != NULL ? 0 : -1;
 }
 
 static int remove_folder(void **state) {
-    (void)state;
     unlink(at("spheres.csv"));
     unlink(at("sparse.csv"));
     unlink(at("zeros.csv"));
@@ -147,10 +139,4 @@ static int remove_folder(void **state) {
     return rmdir(folder);
 }
 
-int main(int argc, char **argv) {
-    const int served = vsh_reader_serve(argc, argv);
-    if (served >= 0) {
-        _exit(served);
-    }
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

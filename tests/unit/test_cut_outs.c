@@ -179,7 +179,6 @@ static int by_disc(double x, double z) {
 }
 
 static int everywhere(double x, double z) {
-    (void)x, (void)z;
     return 1;
 }
 
@@ -190,9 +189,8 @@ static void assert_casts(card c, int (*expected)(double x, double z)) {
 }
 
 static void assert_casts_nothing(card c, const char *why) {
-    vsh_assets *assets = NULL;
+    OWNED(vsh_assets) *assets = NULL;
     assert_fails(load(c, &assets), VSH_ERROR_INPUT, why);
-    vsh_assets_free(assets);
 }
 
 TEST(a_card_casts_the_disc_in_its_textures_alpha) {
@@ -208,7 +206,7 @@ TEST(a_card_casts_the_disc_in_its_textures_alpha) {
 
 /* What is whole is as any other mesh, and what is clear is not there. */
 TEST(only_what_an_edge_crosses_is_asked_of_the_mask) {
-    vsh_assets *assets = NULL;
+    OWNED(vsh_assets) *assets = NULL;
     assert_ok(load((card){0}, &assets));
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
@@ -219,7 +217,6 @@ TEST(only_what_an_edge_crosses_is_asked_of_the_mask) {
     assert_string_equal(meshes[1].material_name, "leaf");
     assert_in_range(meshes[0].triangle_count, 1, 20);
     assert_in_range(meshes[1].triangle_count, 20, 60);
-    vsh_assets_free(assets);
 }
 
 /* Twice across the card: clamped, the texture's own edge goes on beyond it; mirrored, the second disc lies
@@ -366,17 +363,11 @@ TEST(patterns_mean_materials_where_no_object_is_called_so) {
             assert_casts_nothing(one_sided, unknown);
             continue;
         }
-        vsh_assets *assets = NULL;
+        OWNED(vsh_assets) *assets = NULL;
         size_t count = 0;
         assert_ok(load(one_sided, &assets));
         assert_int_equal(vsh_assets_caster(assets, 0, &count)[0].one_sided, 1);
-        vsh_assets_free(assets);
     }
 }
 
-int main(int argc, char **argv) {
-    if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
-        return vsh_reader_serve(argc, argv);
-    }
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -188,7 +188,3 @@ TEST(floats_are_read_as_strtof_reads_them) {
         assert_null(vshi_decimal_float(text, &value));
     }
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

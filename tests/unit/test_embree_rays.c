@@ -6,6 +6,8 @@
 #include "../bench/embree_rays.c"
 #include "truth/directions.h"
 
+OWNER(vshi_sampler)
+
 enum { POINTS = 400 };
 
 /* Of the half plane near enough for floats to tell its edge from what is 1e-6 beside it. */
@@ -35,7 +37,7 @@ typedef struct points {
 } points;
 
 static void trace(bench_rays_task task, double first, double last, points *p) {
-    vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, task.rays, 0);
+    OWNED(vshi_sampler) *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, task.rays, 0);
     task.sampler = sampler;
     memset(p, 0, sizeof *p);
     for (size_t i = 0; i < POINTS; ++i) {
@@ -47,7 +49,6 @@ static void trace(bench_rays_task task, double first, double last, points *p) {
     bench_rays_trace(&task, (const uint32_t(*)[2])net, POINTS, p->origins, p->normals, NULL, p->texels,
                      p->values);
     free(net);
-    vshi_sampler_free(sampler);
 }
 
 static vshi_light_place sun(double angle) {
@@ -64,7 +65,7 @@ static vsh_triangles *half_plane(void) {
 
 TEST(a_half_plane_hides_what_its_closed_form_says) {
     static points p;
-    vsh_triangles *triangles = half_plane();
+    OWNED(vsh_triangles) *triangles = half_plane();
     const vshi_light_place light = sun(0.2);
     for (int32_t rays = 64; rays <= 4096; rays *= 8) {
         const bench_rays_task task = {.triangles = triangles, .rays = rays, .light = &light};
@@ -77,31 +78,29 @@ TEST(a_half_plane_hides_what_its_closed_form_says) {
         /* at most n^-3/4 / 2, at a half (README, method `rays`) */
         assert_true(sqrt(square) < 0.5 * pow(rays, -0.75));
     }
-    vsh_triangles_free(triangles);
 }
 
 TEST(a_wall_hides_of_the_hemisphere_what_its_closed_form_says) {
     static points p;
-    vsh_triangles *triangles = wall((float[]){0.0f, 0.0f, (float)-FAR}, (float[]){0.0f, 1.0f, 0.0f},
-                                    (float[]){0.0f, 0.0f, (float)(2.0 * FAR)});
+    OWNED(vsh_triangles) *triangles = wall((float[]){0.0f, 0.0f, (float)-FAR}, (float[]){0.0f, 1.0f, 0.0f},
+                                           (float[]){0.0f, 0.0f, (float)(2.0 * FAR)});
     const bench_rays_task task = {.triangles = triangles, .rays = 4096, .distance = 10.0 * FAR};
     trace(task, 0.1, 4.0, &p);
     for (size_t i = 0; i < POINTS; ++i) {
         const double x = p.origins[3 * i], hidden = 0.5 * (1.0 - x / sqrt(1.0 + x * x));
         assert_true(fabs((double)p.values[i] - (1.0 - hidden)) < 0.006);
     }
-    vsh_triangles_free(triangles);
 }
 
 /* Also where they are no power of two, and so in no cells. */
 TEST(the_rays_are_the_samplers) {
     static points p;
-    vsh_triangles *triangles = half_plane();
+    OWNED(vsh_triangles) *triangles = half_plane();
     const vshi_light_place light = sun(0.2);
     for (int32_t rays = 1; rays <= 64; rays += rays < 4 ? 1 : 20) {
         const bench_rays_task task = {.triangles = triangles, .rays = rays, .light = &light};
         trace(task, -0.12, 0.12, &p);
-        vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, rays, 0);
+        OWNED(vshi_sampler) *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, rays, 0);
         vshi_vec u, v;
         vshi_frame(light.towards, &u, &v);
         for (size_t i = 0; i < POINTS; ++i) {
@@ -113,11 +112,5 @@ TEST(the_rays_are_the_samplers) {
             }
             assert_float_equal((float)seen / (float)rays, p.values[i], 1e-6f);
         }
-        vshi_sampler_free(sampler);
     }
-    vsh_triangles_free(triangles);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

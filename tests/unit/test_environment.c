@@ -43,28 +43,25 @@ static uint64_t hash(uint64_t h, const void *data, size_t size) {
 }
 
 static int32_t look(void *user, const char *stage, double fraction) {
-    (void)stage;
-    (void)fraction;
     *(size_t *)user += vshi_floats_differ(vshi_floats_get()) != 0;
     return 0;
 }
 
 /* A torus whose every distance is asked for from some thread of the pool. */
 static double ring(void *user, const double p[3]) {
-    (void)user;
     if (vshi_floats_differ(vshi_floats_get())) {
         return (double)NAN; /* refused with VSH_ERROR_INPUT */
     }
     return hypot(hypot(p[0], p[2]) - 1.0, p[1]) - 0.31;
 }
 
+/* Into an outcome of zeros. */
 static void run_all(int s, int32_t threads, outcome *o) {
     const vshi_floats setting = SETTINGS[s];
 
     vsh_run run = run_on(threads);
     run.progress = look;
     run.user = &o->strange;
-    o->strange = 0;
     o->stats = vsh_shade_stats_zero();
     const vsh_distance field = {ring, NULL, 1.0, 0, {-1.4, -0.4, -1.4}, {1.4, 0.4, 1.4}};
     const vsh_grid_options options = with_voxel(0.047);
@@ -84,10 +81,6 @@ static void run_all(int s, int32_t threads, outcome *o) {
     vsh_triangles *triangles = NULL;
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.9, 0.0};
     vsh_mesh mesh = mesh_of_solid(&ball);
-    memset(o->light, 0, sizeof o->light);
-    memset(o->visible, 0, sizeof o->visible);
-    memset(o->open, 0, sizeof o->open);
-    memset(o->traced, 0, sizeof o->traced);
 
     vshi_floats_set(setting);
     results[0] = vsh_grid_from_distance(&field, &options, &run, &grid, &failure);
@@ -150,7 +143,6 @@ TEST(no_setting_of_the_host_shows_and_all_are_given_back) {
         positions[i] += i % 3 == 1 ? -0.7 : 0.0;
         normals[i] += (float)between(&counter, -0.3, 0.3);
     }
-    memset(&expected, 0, sizeof expected);
     run_all(0, 0, &expected);
     assert_int_equal(expected.strange, 0);
     for (int s = 0; s < SETTING_COUNT; ++s) {
@@ -168,7 +160,7 @@ TEST(no_setting_of_the_host_shows_and_all_are_given_back) {
 
 /* Lengths that are denormal numbers, and scenes that have them, are what they are. */
 TEST(denormals_are_numbers) {
-    casting c = caster_of(truth_seeds(), 0.1, 2.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.1, 2.0);
     const double p[3] = {0.3, 1e-310, 0.2}, zero[3] = {0.3, 0.0, 0.2};
     const float tiny[3] = {0.0f, 1e-41f, 1e-44f}, up[3] = {0.0f, 1.0f, 0.0f};
     const double towards[3] = {5e-324, 1e-310, 0.0};
@@ -190,9 +182,4 @@ TEST(denormals_are_numbers) {
             assert_true(fabsf(a - b) <= 1e-2f); /* the normal is turned by a thousandth */
         }
     }
-    caster_free(&c);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -30,7 +30,7 @@ static void add_uvs(const vsh_mesh *mesh, double *sum) {
 static sums sums_of(const char *name, double unit) {
     char path[512];
     snprintf(path, sizeof path, "%s/%s", VSH_MODELS, name);
-    vsh_model *model = NULL;
+    OWNED(vsh_model) *model = NULL;
     assert_ok(vsh_model_read(path, NULL, &model, &failure));
     if (fabs(vsh_model_unit(model) - unit) > 1e-12) {
         fail_msg("%s: a unit of %g m, expected %g", name, vsh_model_unit(model), unit);
@@ -51,7 +51,6 @@ static sums sums_of(const char *name, double unit) {
             add_uvs(&view, s.uv[set]);
         }
     }
-    vsh_model_free(model);
     return s;
 }
 
@@ -115,8 +114,4 @@ TEST(a_figure_stands_as_its_bones_do) {
             expect(names[i], "highest", s.max[k], max[k]);
         }
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

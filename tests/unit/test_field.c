@@ -1,4 +1,5 @@
-/* The pyramid: distances of the seeds' scene against closed forms, level by level. */
+/* The pyramid: distances of the seeds' scene against closed forms, level by level. How fields are made:
+ * limits, progress, bad input. */
 #include "fields.h"
 #include "testing.h"
 
@@ -31,16 +32,16 @@ static float level_value(const vsh_field *field, int32_t level, const double p[3
 
 /* Errors of one level, in its voxels. */
 typedef struct level_errors {
-    size_t count, saturated, wrong_signs; /* in the band, beyond it, at all */
-    double worst, rms;                    /* in the band */
-    double too_long;                      /* by how much a value beyond it claims more than the truth */
+    size_t count, wrong_signs; /* in the band; at all */
+    double worst, rms;         /* in the band */
+    double too_long;           /* by how much a value beyond it claims more than the truth */
 } level_errors;
 
 static level_errors measure(const vsh_field *field, int32_t level, truth_scene scene, const double center[3],
                             double radius, size_t tries) {
     const vshi_level *l = &field->levels[level];
     const double voxel = (double)l->scale * field->voxel_size;
-    level_errors e = {0, 0, 0, 0.0, 0.0, 0.0};
+    level_errors e = {0};
     uint64_t counter = (uint64_t)level;
     for (size_t i = 0; i < tries; ++i) {
         double p[3];
@@ -54,7 +55,6 @@ static level_errors measure(const vsh_field *field, int32_t level, truth_scene s
         const double value = (double)level_value(field, level, p) / (double)l->scale;
         const double band = (double)l->band / (double)l->scale;
         if (fabs(truth) >= band) {
-            ++e.saturated;
             e.too_long = fmax(e.too_long, value > 0.0 ? value - truth : truth - value);
         } else {
             ++e.count;
@@ -67,37 +67,25 @@ static level_errors measure(const vsh_field *field, int32_t level, truth_scene s
     return e;
 }
 
-TEST(each_level_is_within_a_cell_of_the_truth_in_its_band) {
+TEST(each_level_is_within_a_cell_of_the_truth_in_its_band_and_at_thin_parts) {
     OWNED(vsh_field) *field = seeds_field(5.0);
-    const double center[3] = {0.0, 0.75, 0.0};
+    static const struct {
+        double center[3], radius, rms;
+        size_t tries, least;
+        int32_t levels;
+    } parts[] = {{{0.0, 0.75, 0.0}, 3.2, 0.1, 2000000, 50000, 6},
+                 {{1.2, 0.6, -0.3}, 0.6, 0.15, 300000, 10000, 3},
+                 {{0.3, 1.4, 1.5}, 0.6, 0.15, 300000, 10000, 3}};
     assert_int_equal(field->level_count, 6);
-    for (int32_t l = 0; l < field->level_count; ++l) {
-        const double band = (double)field->levels[l].band * VOXEL;
-        const level_errors e = measure(field, l, truth_seeds(), center, 3.2 + band, 2000000);
-        print_message(
-            "level %d: %zu in the band, rms %.4f, worst %.3f voxels; saturated %zu, too long %.3f\n", l,
-            e.count, e.rms, e.worst, e.saturated, e.too_long);
-        assert_true(e.count > 50000);
-        assert_true(e.worst <= 0.87);
-        assert_true(e.rms < 0.1);
-        assert_true(e.too_long <= 0.87);
-        assert_int_equal(e.wrong_signs, 0);
-    }
-}
-
-TEST(thin_parts_are_as_right_as_the_rest) {
-    OWNED(vsh_field) *field = seeds_field(5.0);
-    const truth_scene scene = truth_seeds();
-    const double parts[2][3] = {{1.2, 0.6, -0.3}, {0.3, 1.4, 1.5}};
-    for (int part = 0; part < 2; ++part) {
-        for (int32_t l = 0; l < 3; ++l) {
-            const level_errors e = measure(field, l, scene, parts[part], 0.6, 300000);
-            print_message("part %d level %d: %zu in the band, rms %.4f, worst %.3f voxels\n", part, l,
-                          e.count, e.rms, e.worst);
-            assert_true(e.count > 10000);
-            assert_true(e.worst <= 0.87);
-            assert_true(e.rms < 0.15);
-            assert_true(e.too_long <= 0.87);
+    for (size_t part = 0; part < sizeof parts / sizeof parts[0]; ++part) {
+        for (int32_t l = 0; l < parts[part].levels; ++l) {
+            const double radius =
+                parts[part].radius + (part == 0 ? (double)field->levels[l].band * VOXEL : 0.0);
+            const level_errors e =
+                measure(field, l, truth_seeds(), parts[part].center, radius, parts[part].tries);
+            assert_true(e.count > parts[part].least && e.rms < parts[part].rms);
+            assert_true(e.worst <= 0.87 && e.too_long <= 0.87);
+            assert_int_equal(e.wrong_signs, 0);
         }
     }
 }
@@ -137,8 +125,7 @@ TEST(sampled_distances_are_within_a_voxel_of_the_level_that_resolves_them) {
         /* a voxel is never wider than what it measures, but for the finest */
         assert_true(voxel <= VOXEL || voxel <= fabs(h));
     }
-    print_message("sampled: worst %.3f voxels of the level\n", worst);
-    assert_true(worst <= 0.87);
+    assert_at_most(worst, 0.87);
 }
 
 /* Callers march by these distances. */
@@ -168,10 +155,7 @@ TEST(beyond_the_finest_band_distances_are_lower_bounds) {
                 within = fmax(within, excess);
             }
         }
-        print_message(
-            "solid %d: too large by %.3f voxels within the band, %.3f beyond; at least %.3f of it\n", n,
-            within, beyond, least);
-        assert_true(beyond <= 0.0);
+        assert_at_most(beyond, 0.0);
         assert_true(n == 2 || within <= 0.1); /* a trilinear sample cuts a box's edges off */
         assert_true(least >= 0.6);
     }
@@ -230,19 +214,6 @@ TEST(without_a_wish_the_reach_is_four_diagonals) {
     assert_true(info.reach >= 4.0 * sqrt(12.0) && info.reach < 2.5 * 4.0 * sqrt(12.0));
 }
 
-TEST(coarse_levels_take_a_fraction_of_the_finest_ones_memory) {
-    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
-    OWNED(vsh_field) *one = field_of((truth_scene){&ball, 1}, 0.01, 0.01);
-    OWNED(vsh_field) *many = field_of((truth_scene){&ball, 1}, 0.01, 0.0);
-    vsh_field_info a, b;
-    vsh_field_get_info(one, &a);
-    vsh_field_get_info(many, &b);
-    print_message("ball of 200 voxels: %.2f MB, all of %d levels %.2f MB\n", (double)a.bytes / 1e6, b.levels,
-                  (double)b.bytes / 1e6);
-    /* a third where bands are alike; coarse bands are twice as wide in voxels as the grid's own */
-    assert_true((double)b.bytes < 1.8 * (double)a.bytes);
-}
-
 TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
     const truth_solid solids[] = {{TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 2.0, 0.0},
                                   {TRUTH_BOX, {6.0, 0.0, 0.0}, {1.5, 2.5, 3.5}, 0.0, 0.0},
@@ -275,18 +246,12 @@ TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
 TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
     /* a box turned by 50° about (1, 2, 3), far from the origin; voxels of 0.04 at 1000 units */
     const double half = 25.0 / 180.0 * 3.14159265358979323846, norm = sqrt(14.0);
+    const double turn[4] = {sin(half) / norm, 2.0 * sin(half) / norm, 3.0 * sin(half) / norm, cos(half)};
     vsh_sdf_node node = vsh_sdf_node_default();
     node.shape = VSH_SDF_BOX;
-    node.size[0] = 0.8;
-    node.size[1] = 0.5;
-    node.size[2] = 0.3;
-    node.rotation[0] = sin(half) / norm;
-    node.rotation[1] = 2.0 * sin(half) / norm;
-    node.rotation[2] = 3.0 * sin(half) / norm;
-    node.rotation[3] = cos(half);
-    node.translation[0] = 1000.0;
-    node.translation[1] = -500.0;
-    node.translation[2] = 0.123;
+    memcpy(node.size, (const double[3]){0.8, 0.5, 0.3}, sizeof node.size);
+    memcpy(node.rotation, turn, sizeof node.rotation);
+    memcpy(node.translation, (const double[3]){1000.0, -500.0, 0.123}, sizeof node.translation);
     const vsh_sdf sdf = {&node, 1};
     const vsh_grid_options options = with_voxel(VOXEL);
     vsh_grid *grid = NULL;
@@ -314,11 +279,10 @@ TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
         const double h = resolved_distance(field, p);
         const double truth = truth_solid_distance(&box, local);
         const double error = (h - truth) / resolving_voxel(field, h);
-        assert_true(fabs(error) <= 0.87);
+        assert_at_most(fabs(error), 0.87);
         squares += error * error;
     }
-    print_message("turned box at 1000 units: rms %.4f voxels\n", sqrt(squares / count));
-    assert_true(sqrt(squares / count) < 0.1);
+    assert_less(sqrt(squares / count), 0.1);
 }
 
 TEST(positions_that_are_not_finite_give_nan_and_far_ones_do_not) {
@@ -352,10 +316,10 @@ TEST(info_tells_the_solids_box_and_voxel) {
     vsh_field_info info;
     vsh_field_get_info(field, &info);
     const double low[3] = {-3.0, -0.5, -3.0}, high[3] = {3.0, 2.0, 3.0};
-    assert_true(fabs(info.voxel_size - VOXEL) < 1e-12);
+    assert_less(fabs(info.voxel_size - VOXEL), 1e-12);
     for (int axis = 0; axis < 3; ++axis) {
-        assert_true(fabs(info.bounds_min[axis] - low[axis]) < 2.0 * VOXEL);
-        assert_true(fabs(info.bounds_max[axis] - high[axis]) < 2.0 * VOXEL);
+        assert_less(fabs(info.bounds_min[axis] - low[axis]), 2.0 * VOXEL);
+        assert_less(fabs(info.bounds_max[axis] - high[axis]), 2.0 * VOXEL);
     }
     assert_true(info.shell_thickness == 0.0);
 }
@@ -391,8 +355,6 @@ TEST(values_are_rounded_by_no_more_than_half_a_quantum) {
                 assert_true(fabs(stored) == (double)finest->band && (stored < 0.0) == (exact < 0.0));
             }
         }
-        print_message("half width %g: quantum 2^%g, worst %.3g of it\n", half_widths[h],
-                      log2((double)finest->quantum), worst / (double)finest->quantum);
         assert_true(worst <= (double)finest->rounding + 1e-6); /* of the float to voxels */
         assert_true(worst > 0.9 * (double)finest->rounding);
         for (int32_t l = 0; l < field->level_count; ++l) {
@@ -408,12 +370,150 @@ TEST(a_voxel_takes_no_more_than_eighteen_bytes) {
         vsh_field_info info;
         vsh_field_get_info(field, &info);
         const double each = (double)info.bytes / (double)info.active_voxels;
-        print_message("voxel %g: %.2f bytes for each of %llu\n", voxels[i], each,
-                      (unsigned long long)info.active_voxels);
         assert_true(each > 2.0 && each <= 18.0);
     }
 }
 
-int main(void) {
-    return run_all_tests(NULL, NULL);
+/* --- making */
+
+TEST(the_memory_limit_covers_every_level) {
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
+    vsh_field *field = NULL;
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    vsh_field_free(field);
+
+    vsh_run run = vsh_run_default();
+    vsh_grid_info from;
+    vsh_grid_get_info(grid, &from);
+    run.memory_limit = from.bytes + info.bytes - 1; /* what is given and what comes of it would pass it */
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_LIMIT);
+    assert_null(field);
+    assert_int_equal(failure.code, VSH_ERROR_LIMIT);
+    assert_non_null(strstr(failure.message, "memory limit"));
+    assert_null(strchr(failure.message, '\n'));
+    run.memory_limit = 1000;
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, NULL), VSH_ERROR_LIMIT);
+    assert_null(field);
+    run.memory_limit = 1u << 30;
+    assert_ok(vsh_field_create(grid, NULL, &run, &field, &failure));
+    vsh_field_free(field);
+}
+
+typedef struct progress_log {
+    double limit; /* asks to stop from this fraction on */
+    double last;
+    size_t calls, after_stop;
+    bool falls, stopped, misnamed;
+} progress_log;
+
+static int32_t watch(void *user, const char *stage, double fraction) {
+    progress_log *log = user;
+    ++log->calls;
+    log->falls = log->falls || !(fraction >= log->last && fraction >= 0.0 && fraction <= 1.0);
+    log->after_stop += log->stopped;
+    log->misnamed = log->misnamed || strcmp(stage, "field") != 0;
+    log->last = fraction;
+    log->stopped = log->stopped || fraction >= log->limit;
+    return log->stopped;
+}
+
+TEST(progress_rises_from_0_to_1_and_can_cancel_anywhere) {
+    OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
+    vsh_run run = vsh_run_default();
+    run.progress = watch;
+    const double limits[] = {2.0, 0.0, 0.1, 0.5};
+    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
+        for (int32_t threads = 1; threads <= 5; threads += 4) {
+            progress_log log = {.limit = limits[i], .last = 0.0};
+            OWNED(vsh_field) *field = NULL;
+            run.user = &log;
+            run.threads = threads;
+            const vsh_result result = vsh_field_create(grid, NULL, &run, &field, &failure);
+            assert_false(log.falls);
+            assert_false(log.misnamed);
+            assert_int_equal(log.after_stop, 0);
+            if (limits[i] > 1.0) {
+                assert_ok(result);
+                assert_non_null(field);
+                assert_true(log.last >= 1.0);
+                assert_true(log.calls > 3);
+            } else {
+                assert_int_equal(result, VSH_ERROR_CANCELLED);
+                assert_int_equal(failure.code, VSH_ERROR_CANCELLED);
+                assert_null(field);
+            }
+        }
+    }
+    /* at 1 nothing is left to stop: either answer is true, and neither leaks nor lies */
+    progress_log log = {.limit = 1.0, .last = 0.0};
+    OWNED(vsh_field) *field = NULL;
+    run.user = &log;
+    const vsh_result result = vsh_field_create(grid, NULL, &run, &field, NULL);
+    assert_true(result == VSH_OK ? field != NULL : result == VSH_ERROR_CANCELLED && field == NULL);
+    assert_true(log.last >= 1.0);
+}
+
+TEST(options_and_runs_are_checked) {
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    OWNED(vsh_grid) *grid = grid_of((truth_scene){&ball, 1}, 0.1);
+    vsh_field *field = NULL;
+    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    assert_non_null(field);
+    vsh_field_free(field);
+
+    const double reaches[] = {-1.0, (double)NAN, (double)INFINITY, -(double)INFINITY};
+    for (int i = 0; i < 4; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.reach = reaches[i];
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, &failure), VSH_ERROR_ARGUMENT);
+        assert_null(field);
+        assert_non_null(strstr(failure.message, "reach"));
+        assert_int_equal(vsh_field_create(grid, &options, NULL, &field, NULL), VSH_ERROR_ARGUMENT);
+    }
+    /* the last ends within a member: half a pointer would be called */
+    const size_t sizes[] = {0, sizeof(size_t), sizeof(vsh_field_options) + 8, SIZE_MAX,
+                            offsetof(vsh_run, progress) + 2};
+    for (int i = 0; i < 5; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.struct_size = sizes[i];
+        assert_fails(vsh_field_create(grid, &options, NULL, &field, &failure), VSH_ERROR_ARGUMENT,
+                     "vsh_field_options");
+        vsh_run run = vsh_run_default();
+        run.struct_size = i == 2 ? sizeof run + 8 : sizes[i];
+        assert_fails(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT, "vsh_run");
+    }
+    vsh_run run = run_on(-1);
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT);
+    run.threads = 1025;
+    assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_ARGUMENT);
+    vsh_field_free(NULL);
+}
+
+/* A reach beyond anything must not make levels without end. */
+TEST(a_huge_reach_is_refused_or_met) {
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 1.0, 0.0};
+    OWNED(vsh_grid) *grid = grid_of((truth_scene){&ball, 1}, 0.1);
+    const double reaches[] = {1e3, 1e6, 1e12, 1e300};
+    for (int i = 0; i < 4; ++i) {
+        vsh_field_options options = vsh_field_options_default();
+        options.reach = reaches[i];
+        OWNED(vsh_field) *field = NULL;
+        const vsh_result result = vsh_field_create(grid, &options, NULL, &field, NULL);
+        if (result == VSH_OK) {
+            vsh_field_info info;
+            vsh_field_get_info(field, &info);
+            assert_at_most(info.levels, VSHI_MAX_LEVELS);
+            assert_true(info.reach >= reaches[i] || info.levels == VSHI_MAX_LEVELS);
+            const double far[3] = {0.5 * fmin(reaches[i], 1e12), 0.0, 0.0}, centre[3] = {0.0, 0.0, 0.0};
+            float h;
+            vsh_field_sample(field, 1, far, &h);
+            assert_at_most(fabs((double)h - (far[0] - 1.0)), 0.2 * far[0]);
+            vsh_field_sample(field, 1, centre, &h);
+            assert_less(h, -0.8f);
+        } else {
+            assert_true(result == VSH_ERROR_LIMIT || result == VSH_ERROR_ARGUMENT);
+        }
+    }
 }

@@ -45,10 +45,9 @@ static int set_up(void **state) {
 }
 
 static int tear_down(void **state) {
-    stage *s = *state;
+    FREED stage *s = *state;
     vsh_triangles_free(s->triangles);
     vsh_field_free(s->field);
-    free(s);
     return 0;
 }
 
@@ -78,7 +77,7 @@ static vsh_light sun(void) {
 static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t threads,
                          const vsh_triangles *truth) {
     baked *b = calloc(1, sizeof *b);
-    vsh_charts *charts = create(&s->floor.mesh, 1, options, NULL);
+    OWNED(vsh_charts) *charts = create(&s->floor.mesh, 1, options, NULL);
     const vsh_light light = sun();
     float *const shadow = b->shadow;
     const vsh_lightmap lightmap = {.shadow = &shadow, .ao = b->ao, .coverage = b->coverage};
@@ -89,7 +88,6 @@ static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t t
     const vsh_occluders casters = {
         .field = s->field, .triangles = exact ? s->triangles : NULL, .true_triangles = truth};
     assert_ok(vsh_bake_lightmap(&casters, charts, &light, 1, NULL, &run, &lightmap, &stats, &failure));
-    vsh_charts_free(charts);
     return b;
 }
 
@@ -124,21 +122,17 @@ TEST(what_voxels_lose_is_in_the_estimate) {
     if (s->triangles == NULL) {
         skip();
     }
-    baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, s->triangles);
+    FREED baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, s->triangles);
     double measured[CHANNELS];
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
         const vsh_bake_error *known = &b->errors[c];
         const double said = vsh_bake_error_rmse(known), field = vsh_bake_error_field(known);
-        print_message("%s: measured %.4f, said %.4f, the field's %.4f, by rays alone %.4f\n",
-                      c == 0 ? "shadow" : "ao", measured[c], said, field,
-                      sqrt(known->square_error / known->values));
         assert_true(measured[c] > 0.02);
         assert_true(said > 0.9 * measured[c] && said < 1.1 * measured[c]);
         assert_true(fabs(field * field + known->square_error / known->values - said * said) < 1e-9);
         assert_true(known->held == TEXELS && known->values == TEXELS);
     }
-    free(b);
 }
 
 TEST(exact_values_are_held_against_rays_too) {
@@ -146,43 +140,37 @@ TEST(exact_values_are_held_against_rays_too) {
     if (s->triangles == NULL) {
         skip();
     }
-    baked *b = bake_whole(s, options_of(VSH_SHADOW_EXACT, VSH_AO_EXACT), 0, s->triangles);
+    FREED baked *b = bake_whole(s, options_of(VSH_SHADOW_EXACT, VSH_AO_EXACT), 0, s->triangles);
     double measured[CHANNELS];
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
         const double said = vsh_bake_error_rmse(&b->errors[c]);
-        print_message("measured %.4f, said %.4f\n", measured[c], said);
         assert_true(said < 0.03 && said > 0.9 * measured[c]);
     }
-    free(b);
 }
 
 TEST(without_the_casters_only_rays_are_known) {
     const stage *s = *state;
-    baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
+    FREED baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
     assert_true(b->errors[0].held == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
     assert_true(vsh_bake_error_rmse(&b->errors[0]) == sqrt(b->errors[0].square_error / TEXELS));
     assert_true(isnan(vsh_bake_error_rmse(&b->errors[1]))); /* a preview knows nothing of its error */
-    free(b);
 }
 
 TEST(to_be_measured_changes_no_value) {
     const stage *s = *state;
     const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
-    baked *plain = bake_whole(s, options, 0, NULL), *held = bake_whole(s, options, 0, s->triangles);
+    FREED baked *plain = bake_whole(s, options, 0, NULL), *held = bake_whole(s, options, 0, s->triangles);
     assert_memory_equal(plain->shadow, held->shadow, sizeof plain->shadow);
     assert_memory_equal(plain->ao, held->ao, sizeof plain->ao);
-    free(held);
-    free(plain);
 }
 
 TEST(any_number_of_threads_finds_the_same) {
     const stage *s = *state;
     const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
-    baked *one = bake_whole(s, options, 1, s->triangles), *four = bake_whole(s, options, 4, s->triangles);
+    FREED baked *one = bake_whole(s, options, 1, s->triangles),
+                *four = bake_whole(s, options, 4, s->triangles);
     assert_memory_equal(one, four, sizeof *one);
-    free(four);
-    free(one);
 }
 
 /* A box just over the floor: large voxels make the texels under it invalid. They are filled from lit texels
@@ -207,8 +195,6 @@ TEST(filled_texels_are_not_in_the_estimate) {
     for (int c = 0; c < CHANNELS; ++c) {
         const double said = vsh_bake_error_rmse(&b->errors[c]);
         const double held = sqrt(b->errors[c].held_square_error / b->errors[c].held);
-        print_message("%g valid, %g held; measured %.4f, held %.4f, said %.4f\n", b->errors[c].values,
-                      b->errors[c].held, measured[c], held, said);
         /* one sample stands for several, of which some may be invalid */
         assert_true(b->errors[c].values < 0.9 * TEXELS);
         assert_true(fabs(b->errors[c].held - b->errors[c].values) < 0.01 * b->errors[c].values);
@@ -220,6 +206,4 @@ TEST(filled_texels_are_not_in_the_estimate) {
     vsh_field_free(low.field);
 }
 
-int main(void) {
-    return run_all_tests(set_up, tear_down);
-}
+FIXTURE(set_up, tear_down)

@@ -202,16 +202,12 @@ TEST(casters_become_one_outline) {
 }
 
 static int name_file(void **state) {
-    (void)state;
     const int file = mkstemps(path, 5);
     return file < 0 || close(file) != 0;
 }
 
 static int remove_file(void **state) {
-    (void)state;
     return unlink(path);
 }
 
-int main(void) {
-    return run_all_tests(name_file, remove_file);
-}
+FIXTURE(name_file, remove_file)

@@ -1,45 +1,124 @@
-/* glTF by the text of its specification: accessors of every kind, extensions, poses, and what is refused. */
+/* glTF by the text of its specification: accessors of every kind, extensions, poses and transforms, each
+ * where a reader that is off by a little would give something else; and what is refused. */
 #include "models.h"
 #include "testing.h"
 
-/* A whole file: `rest` is its JSON behind the buffer, in which {B} stands for the buffer's length. */
-static const char *gltf_of(const char *rest, const void *buffer, size_t size) {
-    static char json[1 << 16], text[1 << 14];
-    base64(buffer, size, text);
-    const int length = snprintf(json, sizeof json,
-                                "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":%zu,\"uri\":"
-                                "\"data:application/octet-stream;base64,%s\"}],%s}",
-                                size, text, rest);
-    assert_in_range(length, 1, sizeof json - 1);
+enum { BYTES = 5120, UBYTES, SHORTS, USHORTS, UINTS = 5125, FLOATS };
+
+/* A file on its way: a buffer, and the lists of its views and accessors. */
+typedef struct maker {
+    unsigned char bytes[4096];
+    size_t size;
+    size_t beyond; /* bytes that the buffer has beyond its byteLength */
+    char views[4096], accessors[4096];
+    int count; /* of each */
+} maker;
+
+/* An accessor of all of a view of its own; returns its number. Views begin 4 bytes into their bytes. */
+static int add(maker *m, const void *data, size_t size, const char *view, int type, int count,
+               const char *kind, const char *more) {
+    const char *comma = m->count > 0 ? "," : "";
+    memset(m->bytes + m->size, 0x55, 4); /* what is read by mistake is no number that is meant */
+    memcpy(m->bytes + m->size + 4, data, size);
+    snprintf(m->views + strlen(m->views), sizeof m->views - strlen(m->views),
+             "%s{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu%s}", comma, m->size, size + 4, view);
+    snprintf(m->accessors + strlen(m->accessors), sizeof m->accessors - strlen(m->accessors),
+             "%s{\"bufferView\":%d,\"byteOffset\":4,\"componentType\":%d,\"count\":%d,\"type\":\"%s\"%s}",
+             comma, m->count, type, count, kind, more);
+    m->size += (size + 4 + 3) / 4 * 4;
+    return m->count++;
+}
+
+static const float QUAD[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+static const float UP[4][3] = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
+
+/* One with the corners of a quad, accessor 0, and its normals, accessor 1. */
+static maker *begin(void) {
+    maker *m = calloc(1, sizeof *m);
+    assert_non_null(m);
+    add(m, QUAD, sizeof QUAD, "", FLOATS, 4, "VEC3", "");
+    add(m, UP, sizeof UP, "", FLOATS, 4, "VEC3", "");
+    return m;
+}
+
+/* The file's text: `rest` is all but buffer, views and accessors. */
+static const char *text_of(const maker *m, const char *rest) {
+    static char json[1 << 17], text[1 << 14];
+    base64(m->bytes, m->size, text);
+    const int size = snprintf(json, sizeof json,
+                              "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":%zu,\"uri\":"
+                              "\"data:application/octet-stream;base64,%s\"}],\"bufferViews\":[%s],"
+                              "\"accessors\":[%s],%s}",
+                              m->size - m->beyond, text, m->views, m->accessors, rest);
+    assert_in_range(size, 1, sizeof json - 1);
     return json;
 }
 
-#define ONE_MESH                                                                                             \
-    "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0%s}],\"meshes\":[{\"primitives\":[{%"                \
-    "s\"attributes\":"                                                                                       \
-    "{\"POSITION\":0%s}}]}]"
+#define MESH(attributes, more) "\"meshes\":[{\"primitives\":[{\"attributes\":{" attributes "}" more "}]}]"
+#define NODE(more) "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0" more "}],"
+#define ALONE NODE("")
 
-static vsh_model *read_gltf(const char *rest, const void *buffer, size_t size) {
-    return read_text("a.gltf", gltf_of(rest, buffer, size));
+/* These free the maker. */
+static vsh_model *read_made(maker *m, const char *rest) {
+    vsh_model *model = read_text("a.gltf", text_of(m, rest));
+    free(m);
+    return model;
 }
 
-static void refused_gltf(const char *rest, const void *buffer, size_t size, vsh_result code, const char *part,
-                         const char *other) {
-    refused("a.gltf", gltf_of(rest, buffer, size), code, part, other);
+static void refuse_as(maker *m, const char *rest, vsh_result code, const char *part, const char *other) {
+    refused("a.gltf", text_of(m, rest), code, part, other);
+    free(m);
 }
 
-/* Corner k of the only triangle, in the world. */
-static vshi_vec corner_of(const vsh_model *model, size_t mesh, int k) {
+static void refuse_made(maker *m, const char *rest, const char *part) {
+    refuse_as(m, rest, VSH_ERROR_INPUT, part, "");
+}
+
+static void assert_corner(const vsh_model *model, size_t mesh, int k, double x, double y, double z) {
     const vsh_mesh view = vsh_model_mesh(model, mesh, 0);
     vshi_vec corner[3];
     vshi_mesh_triangle(&view, 0, corner);
-    return corner[k];
+    const double tolerance = 1e-6 * fmax(1.0, fmax(fabs(x), fabs(y)));
+    assert_near(corner[k].x, x, tolerance);
+    assert_near(corner[k].y, y, tolerance);
+    assert_near(corner[k].z, z, tolerance);
 }
 
-static void assert_at(vshi_vec p, double x, double y, double z) {
-    assert_near(p.x, x, 1e-6);
-    assert_near(p.y, y, 1e-6);
-    assert_near(p.z, z, 1e-6);
+static void assert_normal(const vsh_model *model, size_t vertex, double x, double y, double z) {
+    const float *n = vsh_model_mesh(model, 0, 0).normals + 3 * vertex;
+    assert_near((double)n[0], x, 1e-6);
+    assert_near((double)n[1], y, 1e-6);
+    assert_near((double)n[2], z, 1e-6);
+}
+
+/* --- accessors */
+
+TEST(offsets_of_views_and_accessors_add_up) {
+    OWNED(vsh_model) *model = read_made(begin(), ALONE MESH("\"POSITION\":0,\"NORMAL\":1", ""));
+    assert_corner(model, 0, 1, 1, 0, 0);
+    assert_corner(model, 0, 2, 1, 1, 0);
+    assert_normal(model, 2, 0, 0, 1);
+    maker *m = begin(); /* a view that begins in the buffer and ends behind it */
+    snprintf(m->views + strlen(m->views), 200, ",{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":48}",
+             m->size - 44);
+    strcat(m->accessors, ",{\"bufferView\":2,\"componentType\":5126,\"count\":1,\"type\":\"VEC3\"}");
+    refuse_made(m, ALONE MESH("\"POSITION\":2", ""), "bufferViews[2]: 48 bytes");
+    m = begin(); /* and one that ends behind its byteLength */
+    m->beyond = 4;
+    refuse_made(m, ALONE MESH("\"POSITION\":1", ""), "bufferViews[1]: 52 bytes");
+    static const struct {
+        const char *offset, *part;
+    } bad[] = {{"8", "pass the 52 bytes of bufferViews[0]"}, /* where the buffer goes on */
+               {"1e300", "count or byteOffset"},
+               {"-4", "count or byteOffset"},
+               {"9007199254740992", "pass the 52 bytes"}};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        m = begin();
+        snprintf(m->accessors + strlen(m->accessors), 200,
+                 ",{\"bufferView\":0,\"byteOffset\":%s,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}",
+                 bad[i].offset);
+        refuse_made(m, ALONE MESH("\"POSITION\":2", ""), bad[i].part);
+    }
 }
 
 /* KHR_mesh_quantization: every type, as it is and normalized, with a stride that is no multiple of the type.
@@ -47,276 +126,356 @@ static void assert_at(vshi_vec p, double x, double y, double z) {
 TEST(quantized_positions_stand_for_their_numbers) {
     static const struct {
         int type, size;
-        double most;
-        bool is_signed;
+        long lowest, most;
     } types[] = {
-        {5120, 1, 127.0, true}, {5121, 1, 255.0, false}, {5122, 2, 32767.0, true}, {5123, 2, 65535.0, false}};
+        {BYTES, 1, -127, 127}, {UBYTES, 1, 0, 255}, {SHORTS, 2, -32767, 32767}, {USHORTS, 2, 0, 65535}};
     for (size_t t = 0; t < 4; ++t) {
+        const long at[3][3] = {{0, 0, 0}, {types[t].most, 0, 0}, {types[t].lowest, types[t].most, 1}};
+        unsigned char bytes[24] = {0};
+        for (size_t i = 0; i < 9; ++i) {
+            const uint16_t bits = (uint16_t)at[i / 3][i % 3];
+            memcpy(bytes + 8 * (i / 3) + (size_t)types[t].size * (i % 3), &bits, (size_t)types[t].size);
+        }
         for (int normalized = 0; normalized < 2; ++normalized) {
-            const long lowest = types[t].is_signed ? -(long)types[t].most : 0, most = (long)types[t].most;
-            const long at[3][3] = {{0, 0, 0}, {most, 0, 0}, {lowest, most, 1}};
-            unsigned char buffer[24] = {0};
-            for (size_t i = 0; i < 3; ++i) {
-                for (size_t k = 0; k < 3; ++k) {
-                    const unsigned long bits = (unsigned long)at[i][k];
-                    unsigned char *to = buffer + 8 * i + (size_t)types[t].size * k;
-                    to[0] = (unsigned char)bits;
-                    if (types[t].size == 2) {
-                        to[1] = (unsigned char)(bits >> 8);
-                    }
-                }
-            }
-            char rest[1024];
-            snprintf(
-                rest, sizeof rest,
-                "\"extensionsRequired\":[\"KHR_mesh_quantization\"]," ONE_MESH
-                ",\"accessors\":[{\"bufferView\":0,\"componentType\":%d,\"count\":3,\"type\":\"VEC3\","
-                "\"normalized\":%s}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":24,\"byteStride\":8}]",
-                ",\"scale\":[2,2,2]", "", "", types[t].type, normalized ? "true" : "false");
-            vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
-            const double unit = normalized ? 2.0 / types[t].most : 2.0;
-            const double tolerance = normalized ? 1e-6 : 1e-6 * types[t].most;
+            maker *m = begin();
+            add(m, bytes, sizeof bytes, ",\"byteStride\":8", types[t].type, 3, "VEC3",
+                normalized ? ",\"normalized\":true" : "");
+            OWNED(vsh_model) *model = read_made(m, "\"extensionsRequired\":[\"KHR_mesh_quantization\"]," NODE(
+                                                       ",\"scale\":[2,2,2]") MESH("\"POSITION\":2", ""));
+            const double unit = normalized ? 2.0 / (double)types[t].most : 2.0;
             for (int i = 0; i < 3; ++i) {
-                const vshi_vec p = corner_of(model, 0, i);
-                assert_near(p.x, unit * (double)at[i][0], tolerance);
-                assert_near(p.y, unit * (double)at[i][1], tolerance);
-                assert_near(p.z, unit * (double)at[i][2], tolerance);
+                assert_corner(model, 0, i, unit * (double)at[i][0], unit * (double)at[i][1],
+                              unit * (double)at[i][2]);
             }
-            vsh_model_free(model);
         }
     }
 }
 
-static const float corners[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-
-#define FOUR_CORNERS                                                                                         \
-    "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"%s}%s],"           \
-    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":48}%s]"
-
-TEST(sparse_accessors_replace_elements) {
-    unsigned char buffer[48 + 4 + 24];
-    const float moved[2][3] = {{5, 0, 0}, {0, 7, 0}};
-    memcpy(buffer, corners, 48);
-    memcpy(buffer + 48, (unsigned char[4]){1, 2, 0, 0}, 4);
-    memcpy(buffer + 52, moved, 24);
-    char rest[2048];
-    for (int with_view = 0; with_view < 2; ++with_view) { /* without: of zeros */
-        snprintf(rest, sizeof rest,
-                 ONE_MESH
-                 ",\"accessors\":[{%s\"componentType\":5126,\"count\":4,\"type\":\"VEC3\",\"sparse\":"
-                 "{\"count\":2,\"indices\":{\"bufferView\":1,\"componentType\":5121},\"values\":{"
-                 "\"bufferView\":2}}}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},{\"buffer\":"
-                 "0,\"byteOffset\":48,\"byteLength\":2},{\"buffer\":0,\"byteOffset\":52,"
-                 "\"byteLength\":24}]",
-                 "", "", "", with_view ? "\"bufferView\":0," : "");
-        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
-        assert_at(corner_of(model, 0, 1), 5, 0, 0);
-        assert_at(corner_of(model, 0, 2), 0, 7, 0);
-        vsh_model_free(model);
-    }
-    buffer[49] = 4;
-    refused_gltf(rest, buffer, sizeof buffer, VSH_ERROR_INPUT, "sparse index 1 of 2 is 4", "accessors[0]");
-}
-
-/* KHR_mesh_quantization as gltfpack writes it: normals of bytes, UVs of unsigned shorts, indices of every
- * type. */
+/* As gltfpack writes it: normals of bytes, UVs of unsigned shorts, indices of every type. */
 TEST(quantized_normals_uvs_and_indices_stand_for_their_numbers) {
-    for (int type = 5121; type <= 5125; type += 2) {
-        unsigned char buffer[48 + 16 + 16 + 24] = {0};
-        memcpy(buffer, corners, 48);
-        for (size_t v = 0; v < 4; ++v) {
-            memcpy(buffer + 48 + 4 * v, (int8_t[4]){0, -127, (int8_t)-128, 0}, 4);
-            memcpy(buffer + 64 + 4 * v, (uint16_t[2]){(uint16_t)(13107 * v), 65535}, 4);
+    static const uint32_t order[6] = {0, 1, 2, 0, 2, 3};
+    for (int type = UBYTES; type <= UINTS; type += 2) {
+        const size_t size = type == UBYTES ? 1 : type == USHORTS ? 2 : 4;
+        for (int count = 6; count >= 5; --count) { /* a corner alone is no triangle */
+            unsigned char normals[16], uvs[16], indices[24] = {0};
+            for (size_t v = 0; v < 4; ++v) {
+                memcpy(normals + 4 * v, (int8_t[4]){0, -127, (int8_t)-128, 0}, 4);
+                memcpy(uvs + 4 * v, (uint16_t[2]){(uint16_t)(13107 * v), 65535}, 4);
+            }
+            for (size_t i = 0; i < 6; ++i) {
+                indices[size * i] = (unsigned char)order[i];
+            }
+            maker *m = begin();
+            add(m, normals, 16, ",\"byteStride\":4", BYTES, 4, "VEC3", ",\"normalized\":true");
+            add(m, uvs, 16, "", USHORTS, 4, "VEC2", ",\"normalized\":true");
+            add(m, indices, 24, "", type, count, "SCALAR", "");
+            OWNED(vsh_model) *model =
+                read_made(m, "\"extensionsRequired\":[\"KHR_mesh_quantization\"]," ALONE MESH(
+                                 "\"POSITION\":0,\"NORMAL\":2,\"TEXCOORD_0\":3", ",\"indices\":4"));
+            const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
+            assert_int_equal(mesh.triangle_count, count / 3);
+            assert_memory_equal(mesh.indices, order, 3 * mesh.triangle_count * sizeof order[0]);
+            for (size_t v = 0; v < mesh.vertex_count; ++v) {
+                assert_normal(model, v, 0, -1, -1); /* -128, too */
+                assert_near((double)mesh.uvs[2 * v], 0.2 * (double)v, 1e-7);
+                assert_true(mesh.uvs[2 * v + 1] == 0.0F); /* v up */
+            }
         }
-        const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-        const size_t size = type == 5121 ? 1 : type == 5123 ? 2 : 4;
-        for (size_t i = 0; i < 6; ++i) {
-            buffer[80 + size * i] = (unsigned char)indices[i];
-        }
-        char rest[2048];
-        snprintf(
-            rest, sizeof rest,
-            "\"extensionsRequired\":[\"KHR_mesh_quantization\"],\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{"
-            "\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"NORMAL\":1,"
-            "\"TEXCOORD_0\":2},\"indices\":3}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
-            "\"count\":4,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5120,\"normalized\":true,"
-            "\"count\":4,\"type\":\"VEC3\"},{\"bufferView\":2,\"componentType\":5123,\"normalized\":true,"
-            "\"count\":4,\"type\":\"VEC2\"},{\"bufferView\":3,\"componentType\":%d,\"count\":6,\"type\":"
-            "\"SCALAR\"}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},{\"buffer\":0,\"byteOffset\":48,"
-            "\"byteLength\":16,\"byteStride\":4},{\"buffer\":0,\"byteOffset\":64,\"byteLength\":16},{"
-            "\"buffer\":0,\"byteOffset\":80,\"byteLength\":24}]",
-            type);
-        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
-        const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
-        assert_memory_equal(mesh.indices, indices, sizeof indices);
-        for (size_t v = 0; v < 4; ++v) {
-            assert_true(mesh.normals[3 * v] == 0.0F && mesh.normals[3 * v + 1] == -1.0F);
-            assert_true(mesh.normals[3 * v + 2] == -1.0F); /* -128, too */
-            assert_near((double)mesh.uvs[2 * v], 0.2 * (double)v, 1e-7);
-            assert_true(mesh.uvs[2 * v + 1] == 0.0F); /* v up */
-        }
-        vsh_model_free(model);
-        memcpy(strstr(rest, "\"count\":6"), "\"count\":5", 9); /* a corner alone is no triangle */
-        model = read_gltf(rest, buffer, sizeof buffer);
-        assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 1);
-        vsh_model_free(model);
     }
 }
+
+#define SPARSE(count, type, indices, values)                                                                 \
+    ",\"sparse\":{\"count\":" count ",\"indices\":{\"bufferView\":" indices                                  \
+    ",\"byteOffset\":4,\"componentType\":" type "},\"values\":{\"bufferView\":" values ",\"byteOffset\":4}}"
 
 /* Indices of every type, in no order; the last of those that agree counts. */
-TEST(sparse_indices_may_be_of_any_unsigned_type) {
+TEST(sparse_parts_replace_elements_by_indices_of_any_unsigned_type) {
     static const float moved[3][3] = {{9, 9, 9}, {0, 7, 0}, {5, 0, 0}};
+    static const uint16_t order[3] = {0, 3, 2}, third[3] = {9, 2, 1};
     static const struct {
-        int type;
         size_t size;
-        vsh_result result;
-    } types[] = {{5121, 1, VSH_OK},          {5123, 2, VSH_OK},          {5125, 4, VSH_OK},
-                 {5120, 1, VSH_ERROR_INPUT}, {5126, 4, VSH_ERROR_INPUT}, {0, 1, VSH_ERROR_INPUT}};
+        const char *sparse;
+        unsigned char last; /* index */
+        const char *part;   /* why it is refused */
+    } types[] = {{1, SPARSE("3", "5121", "2", "3"), 1, NULL},
+                 {2, SPARSE("3", "5123", "2", "3"), 1, NULL},
+                 {4, SPARSE("3", "5125", "2", "3"), 1, NULL},
+                 {1, SPARSE("3", "5120", "2", "3"), 1, "its sparse part is wrong"},
+                 {4, SPARSE("3", "5126", "2", "3"), 1, "its sparse part is wrong"},
+                 {1, SPARSE("3", "0", "2", "3"), 1, "its sparse part is wrong"},
+                 {1, SPARSE("5", "5121", "2", "3"), 1, "its sparse part is wrong"},
+                 {1, SPARSE("3", "5121", "2", "3"), 4, "sparse index 2 of 3 is 4"}};
     for (size_t t = 0; t < sizeof types / sizeof types[0]; ++t) {
-        unsigned char buffer[48 + 12 + 36] = {0};
-        memcpy(buffer, corners, 48);
-        buffer[48] = 1;
-        buffer[48 + types[t].size] = 2;
-        buffer[48 + 2 * types[t].size] = 1;
-        memcpy(buffer + 60, moved, 36);
-        char rest[2048];
-        snprintf(rest, sizeof rest,
-                 ONE_MESH
-                 ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":"
-                 "\"VEC3\",\"sparse\":{\"count\":3,\"indices\":{\"bufferView\":1,\"componentType\":%d},"
-                 "\"values\":{\"bufferView\":2}}}],\"bufferViews\":[{\"buffer\":0,\"byteLength\":48},{"
-                 "\"buffer\":0,\"byteOffset\":48,\"byteLength\":%zu},{\"buffer\":0,\"byteOffset\":60,"
-                 "\"byteLength\":36}]",
-                 "", "", "", types[t].type, 3 * types[t].size);
-        if (types[t].result != VSH_OK) {
-            refused_gltf(rest, buffer, sizeof buffer, types[t].result, "its sparse part is wrong",
-                         "accessors[0]");
+        unsigned char indices[12] = {[0] = 1};
+        indices[types[t].size] = 2;
+        indices[2 * types[t].size] = types[t].last;
+        maker *m = begin();
+        add(m, indices, 3 * types[t].size, "", UBYTES, 3, "SCALAR", "");
+        add(m, moved, sizeof moved, "", FLOATS, 3, "VEC3", "");
+        add(m, QUAD, sizeof QUAD, "", FLOATS, 4, "VEC3", types[t].sparse);
+        /* of no view: of zeros */
+        snprintf(m->accessors + strlen(m->accessors), 400,
+                 ",{\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"%s}", types[t].sparse);
+        add(m, third, sizeof third, "", USHORTS, 3, "SCALAR", "");
+        if (types[t].part != NULL) {
+            refuse_as(m, ALONE MESH("\"POSITION\":4", ""), VSH_ERROR_INPUT, types[t].part, "accessors[4]");
             continue;
         }
-        vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
-        assert_at(corner_of(model, 0, 1), 5, 0, 0);
-        assert_at(corner_of(model, 0, 2), 0, 7, 0);
-        vsh_model_free(model);
+        const char *text = text_of(m, ALONE MESH("\"POSITION\":4", ""));
+        for (int with_view = 0; with_view < 2; ++with_view) {
+            OWNED(vsh_model) *model = read_text("a.gltf", text);
+            assert_corner(model, 0, 1, 5, 0, 0);
+            assert_corner(model, 0, 2, 0, 7, 0);
+            text = text_of(m, ALONE MESH("\"POSITION\":5", ""));
+        }
+        free(m);
+    }
+    maker *m = begin(); /* of indices */
+    add(m, (const uint16_t[2]){1, 2}, 4, "", USHORTS, 2, "SCALAR", "");
+    add(m, order + 1, 4, "", USHORTS, 2, "SCALAR", "");
+    add(m, (const uint16_t[3]){0, 1, 2}, 6, "", USHORTS, 3, "SCALAR", SPARSE("2", "5123", "2", "3"));
+    OWNED(vsh_model) *model = read_made(m, ALONE MESH("\"POSITION\":0", ",\"indices\":4"));
+    for (int k = 0; k < 3; ++k) {
+        const float *p = QUAD[order[k]];
+        assert_corner(model, 0, k, (double)p[0], (double)p[1], 0);
     }
 }
 
+TEST(attributes_of_another_length_or_type_are_refused) {
+    maker *m = begin();
+    add(m, QUAD, sizeof QUAD, "", FLOATS, 3, "VEC3", "");
+    refuse_made(m, ALONE MESH("\"POSITION\":2,\"NORMAL\":1", ""), "NORMAL has 4 elements for 3");
+    m = begin();
+    add(m, QUAD, sizeof QUAD, "", FLOATS, 3, "VEC4", "");
+    refuse_made(m, ALONE MESH("\"POSITION\":2", ""), "POSITION has 4 components");
+}
+
+TEST(vertices_that_are_not_used_take_nothing_of_others_with_them) {
+    static const uint16_t order[4] = {1, 2, 3, 0};
+    static const float normals[4][3] = {{0, 0, 1}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}};
+    static const float uvs[4][2] = {{0.9F, 0.9F}, {0.1F, 0}, {0.2F, 0}, {0.3F, 0.25F}};
+    maker *m = begin();
+    add(m, order, sizeof order, "", USHORTS, 3, "SCALAR", "");
+    add(m, normals, sizeof normals, "", FLOATS, 4, "VEC3", "");
+    add(m, uvs, sizeof uvs, "", FLOATS, 4, "VEC2", "");
+    OWNED(vsh_model) *model =
+        read_made(m, ALONE MESH("\"POSITION\":0,\"NORMAL\":3,\"TEXCOORD_0\":4,\"TEXCOORD_1\":4,"
+                                "\"TEXCOORD_2\":4",
+                                ",\"indices\":2"));
+    const vsh_mesh view = vsh_model_mesh(model, 0, 2);
+    assert_int_equal(view.vertex_count, 3);
+    assert_corner(model, 0, 0, 1, 0, 0);
+    assert_corner(model, 0, 2, 0, 1, 0);
+    assert_normal(model, 0, 1, 0, 0);
+    assert_normal(model, 2, 0, 0, -1);
+    assert_non_null(view.uvs);
+    assert_true(view.uvs[0] == 0.1F && view.uvs[4] == 0.3F && view.uvs[5] == 0.75F);
+}
+
+/* --- primitives */
+
 TEST(strips_and_fans_become_triangles_of_one_winding) {
-    static const float zigzag[4][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+    static const uint16_t zigzag[4] = {0, 1, 3, 2}, round[4] = {0, 1, 2, 3};
     for (int mode = 5; mode <= 6; ++mode) {
-        char rest[1024], of[32];
-        snprintf(of, sizeof of, "\"mode\":%d,", mode);
-        snprintf(rest, sizeof rest, ONE_MESH "," FOUR_CORNERS, "", of, "", "", "", "");
-        vsh_model *model = read_gltf(rest, mode == 5 ? zigzag : corners, 48);
+        maker *m = begin();
+        add(m, mode == 5 ? zigzag : round, 8, "", USHORTS, 4, "SCALAR", "");
+        OWNED(vsh_model) *model =
+            read_made(m, mode == 5 ? ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5")
+                                   : ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":6"));
         const vsh_mesh_report report = check(model, 0);
         assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 2);
         assert_int_equal(report.flipped_edges, 0);
         assert_int_equal(report.open_edges, 4);
         assert_near(report.area, 1.0, 1e-12);
-        vsh_model_free(model);
     }
 }
 
-TEST(required_extensions_that_are_not_known_are_refused_by_name) {
-    static const struct {
-        const char *name, *advice;
-    } unknown[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "to be seen"}};
-    static const char *const known[] = {"KHR_mesh_quantization", "KHR_texture_transform",
-                                        "KHR_materials_unlit", "KHR_lights_punctual"};
-    char rest[1024];
-    for (size_t i = 0; i < 2; ++i) {
-        snprintf(rest, sizeof rest, "\"extensionsRequired\":[\"%s\"]," ONE_MESH "," FOUR_CORNERS,
-                 unknown[i].name, "", "", "", "", "", "");
-        refused_gltf(rest, corners, 48, VSH_ERROR_UNSUPPORTED, unknown[i].name, unknown[i].advice);
+TEST(strips_leave_out_what_has_no_area_and_lists_what_is_over) {
+    static const uint16_t strip[6] = {0, 1, 2, 2, 2, 3};
+    for (int mode = 4; mode <= 5; ++mode) {
+        maker *m = begin();
+        add(m, strip, sizeof strip, "", USHORTS, mode == 4 ? 5 : 6, "SCALAR", "");
+        OWNED(vsh_model) *model =
+            read_made(m, mode == 4 ? ALONE MESH("\"POSITION\":0", ",\"indices\":2")
+                                   : ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5"));
+        assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 1);
     }
-    for (size_t i = 0; i < 4; ++i) {
-        snprintf(rest, sizeof rest, "\"extensionsRequired\":[\"%s\"]," ONE_MESH "," FOUR_CORNERS, known[i],
-                 "", "", "", "", "", "");
-        vsh_model_free(read_gltf(rest, corners, 48));
-    }
-}
-
-TEST(instances_stand_behind_their_node) {
-    unsigned char buffer[48 + 24];
-    const float moves[2][3] = {{0, 0, 0}, {3, 0, 0}};
-    memcpy(buffer, corners, 48);
-    memcpy(buffer + 48, moves, 24);
-    char rest[2048];
-    snprintf(rest, sizeof rest,
-             "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"]," ONE_MESH "," FOUR_CORNERS,
-             ",\"scale\":[2,2,2],\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{"
-             "\"TRANSLATION\":1}}}",
-             "", "", "", ",{\"bufferView\":1,\"componentType\":5126,\"count\":2,\"type\":\"VEC3\"}",
-             ",{\"buffer\":0,\"byteOffset\":48,\"byteLength\":24}");
-    vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
-    assert_int_equal(vsh_model_mesh_count(model), 2);
-    assert_at(corner_of(model, 0, 1), 2, 0, 0);
-    assert_at(corner_of(model, 1, 1), 8, 0, 0);
-    assert_int_not_equal(vsh_model_mesh(model, 0, 0).object, vsh_model_mesh(model, 1, 0).object);
-    vsh_model_free(model);
-}
-
-/* Two joints with a matrix each; the node's own transform is none of the skin's business. */
-TEST(skins_are_at_rest_and_leave_their_node_out) {
-    unsigned char buffer[48 + 16 + 64 + 128] = {0};
-    memcpy(buffer, corners, 48);
-    for (size_t v = 0; v < 4; ++v) {
-        const float weights[4] = {0.75F, 0.25F, 0, 0};
-        buffer[48 + 4 * v + 1] = 1;
-        memcpy(buffer + 64 + 16 * v, weights, 16);
-    }
-    for (size_t joint = 0; joint < 2; ++joint) {
-        float m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-        m[12] = joint == 1 ? -2.0F : 0.0F; /* bound two to the right */
-        memcpy(buffer + 128 + 64 * joint, m, 64);
-    }
-    char rest[4096];
-    snprintf(
-        rest, sizeof rest,
-        "\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"mesh\":0,\"skin\":0,\"translation\":[100,0,0]},"
-        "{\"children\":[2],\"translation\":[0,4,0]},{\"translation\":[2,8,0]}],\"skins\":[{\"joints\":[1,"
-        "2],\"inverseBindMatrices\":3}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,"
-        "\"JOINTS_0\":1,\"WEIGHTS_0\":2}}]}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,"
-        "\"count\":4,\"type\":\"VEC3\"},{\"bufferView\":1,\"componentType\":5121,\"count\":4,\"type\":"
-        "\"VEC4\"},{\"bufferView\":2,\"componentType\":5126,\"count\":4,\"type\":\"VEC4\"},{"
-        "\"bufferView\":3,\"componentType\":5126,\"count\":2,\"type\":\"MAT4\"}],\"bufferViews\":[{"
-        "\"buffer\":0,\"byteLength\":48},{\"buffer\":0,\"byteOffset\":48,\"byteLength\":16},{\"buffer\":0,"
-        "\"byteOffset\":64,\"byteLength\":64},{\"buffer\":0,\"byteOffset\":128,\"byteLength\":128}]");
-    vsh_model *model = read_gltf(rest, buffer, sizeof buffer);
-    assert_at(corner_of(model, 0, 0), 0, 0.75 * 4 + 0.25 * 12, 0);
-    assert_at(corner_of(model, 0, 1), 1, 6, 0);
-    vsh_model_free(model);
-    buffer[49] = 2;
-    refused_gltf(rest, buffer, sizeof buffer, VSH_ERROR_INPUT, "vertex 0 uses joint 2", "only 2");
 }
 
 TEST(alpha_comes_with_the_mesh) {
     static const char *const modes[] = {"OPAQUE", "MASK", "BLEND"};
-    for (int32_t i = 0; i < 3; ++i) {
+    for (int32_t i = 0; i < 4; ++i) {
         char rest[1024];
-        snprintf(rest, sizeof rest, "\"materials\":[{\"alphaMode\":\"%s\"}]," ONE_MESH "," FOUR_CORNERS,
-                 modes[i], "", "\"material\":0,", "", "", "", "");
-        vsh_model *model = read_gltf(rest, corners, 48);
-        assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, i);
-        vsh_model_free(model);
+        snprintf(rest, sizeof rest,
+                 "\"materials\":[{\"alphaMode\":\"%s\"}]," ALONE MESH("\"POSITION\":0", ",\"material\":0"),
+                 modes[i % 3]);
+        OWNED(vsh_model) *model = i < 3 ? read_made(begin(), rest) : read_text("a.obj", quad_obj);
+        assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, i % 3);
     }
-    vsh_model *model = read_text("a.obj", "mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n");
-    assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, VSH_ALPHA_OPAQUE);
-    vsh_model_free(model);
+}
+
+/* --- poses */
+
+TEST(nodes_stand_by_rotation_matrix_and_scene) {
+    static const struct {
+        const char *rest;
+        double second[3], third[3]; /* corners */
+    } files[] = {
+        /* a right angle about x, by a quaternion of length 1 and of length 2 */
+        {NODE(",\"rotation\":[0.70710678,0,0,0.70710678]"), {1, 0, 0}, {1, 0, 1}},
+        {NODE(",\"rotation\":[0,1.41421356,0,1.41421356]"), {0, 0, -1}, {0, 1, -1}},
+        /* columns: x to y, y to z, z to x, then a move */
+        {NODE(",\"matrix\":[0,1,0,0, 0,0,1,0, 1,0,0,0, 5,6,7,1]"), {5, 7, 7}, {5, 7, 8}},
+        {"\"scene\":1,\"scenes\":[{\"nodes\":[0]},{\"nodes\":[1]}],\"nodes\":[{\"mesh\":0},{\"mesh\":0,"
+         "\"translation\":[0,0,9]}],",
+         {1, 0, 9},
+         {1, 1, 9}},
+        /* no scene: what is nobody's child */
+        {"\"nodes\":[{\"mesh\":0},{\"children\":[0],\"translation\":[0,3,0]}],", {1, 3, 0}, {1, 4, 0}},
+    };
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+        char rest[1024];
+        snprintf(rest, sizeof rest, "%s" MESH("\"POSITION\":0", ""), files[i].rest);
+        OWNED(vsh_model) *model = read_made(begin(), rest);
+        assert_int_equal(vsh_model_mesh_count(model), 1);
+        const double *b = files[i].second, *c = files[i].third;
+        assert_corner(model, 0, 1, b[0], b[1], b[2]);
+        assert_corner(model, 0, 2, c[0], c[1], c[2]);
+    }
+}
+
+TEST(instances_stand_behind_their_node_and_have_equally_many_of_each) {
+    static const float moves[3][3] = {{0, 0, 0}, {4, 0, 0}, {0, 0, 0}};
+    static const float turns[2][4] = {{0, 0, 0, 1}, {0, 0, 0.70710678F, 0.70710678F}};
+    static const char rest[] = "\"extensionsRequired\":[\"EXT_mesh_gpu_instancing\"]," NODE(
+        ",\"scale\":[2,2,2],\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"TRANSLATION\":2,"
+        "\"ROTATION\":3}}}") MESH("\"POSITION\":0", "");
+    for (int count = 3; count >= 2; --count) {
+        maker *m = begin();
+        add(m, moves, sizeof moves, "", FLOATS, count, "VEC3", "");
+        add(m, turns, sizeof turns, "", FLOATS, 2, "VEC4", "");
+        if (count == 3) {
+            refuse_made(m, rest, "ROTATION has 2 elements for 3");
+            continue;
+        }
+        OWNED(vsh_model) *model = read_made(m, rest);
+        assert_int_equal(vsh_model_mesh_count(model), 2);
+        assert_corner(model, 0, 1, 2, 0, 0);
+        assert_corner(model, 1, 1, 8, 2, 0);
+        assert_int_not_equal(vsh_model_mesh(model, 0, 0).object, vsh_model_mesh(model, 1, 0).object);
+    }
+}
+
+TEST(morph_targets_move_normals_too) {
+    static const float moves[4][3] = {{0, 0, 0}, {0, 0, 2}, {0, 0, 0}, {0, 0, 0}};
+    static const float turns[4][3] = {{0, 0, 0}, {0.8F, 0, -0.8F}, {0, 0, 0}, {0, 0, 0}};
+    maker *m = begin();
+    add(m, moves, sizeof moves, "", FLOATS, 4, "VEC3", "");
+    add(m, turns, sizeof turns, "", FLOATS, 4, "VEC3", "");
+    OWNED(vsh_model) *model =
+        read_made(m, ALONE "\"meshes\":[{\"weights\":[0.5],\"primitives\":[{\"attributes\":{\"POSITION\":0,"
+                           "\"NORMAL\":1},\"targets\":[{\"POSITION\":2,\"NORMAL\":3}]}]}]");
+    assert_corner(model, 0, 1, 1, 0, 1);
+    assert_normal(model, 1, 0.4, 0, 0.6);
+}
+
+/* The quad skinned to joints 1 (at 0, 4, 0, turned by a right angle about z) and 2 (at 10, 0, 0; bound two to
+ * the right). The node's own transform is none of the skin's business. */
+TEST(skins_are_at_rest_scale_weights_add_sets_and_turn_normals) {
+    static const float sideways[4][3] = {{1, 0, 0}, {1, 0, 0}, {1, 0, 0}, {1, 0, 0}};
+    static const uint8_t second[4][8] = {{1}, {1}, {1}, {1}};
+    static const float half[4][4] = {{0.5F}, {0.5F}, {0.5F}, {0}};
+    static const float none[4][4] = {{0}, {0.5F}, {0}, {0}};
+    static const float bound[2][16] = {{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1},
+                                       {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, -2, 0, 0, 1}};
+    static const char *const parts[] = {NULL, "joints are no four bytes", "joint 1 is no node of the scene",
+                                        "2 joints, but 1 matrices", "vertex 0 uses joint 2"};
+    for (int wrong = 0; wrong < 5; ++wrong) {
+        const uint8_t first[4][8] = {{wrong == 4 ? 2 : 0}, {0}, {0}, {0}};
+        maker *m = begin();
+        add(m, half, sizeof half, "", FLOATS, 4, "VEC4", "");
+        add(m, sideways, sizeof sideways, "", FLOATS, 4, "VEC3", "");
+        add(m, first, sizeof first, ",\"byteStride\":8", UBYTES, wrong == 1 ? 3 : 4, "VEC4", "");
+        add(m, second, sizeof second, ",\"byteStride\":8", UBYTES, 4, "VEC4", "");
+        add(m, none, sizeof none, "", FLOATS, 4, "VEC4", "");
+        add(m, bound, sizeof bound, "", FLOATS, wrong == 3 ? 1 : 2, "MAT4", "");
+        char rest[2048];
+        snprintf(
+            rest, sizeof rest,
+            "\"scenes\":[{\"nodes\":[0,1%s]}],\"nodes\":[{\"mesh\":0,\"skin\":0,\"translation\":[100,0,"
+            "0]},{\"translation\":[0,4,0],\"rotation\":[0,0,0.70710678,0.70710678]},{\"translation\":[10,"
+            "0,0]}],\"skins\":[{\"joints\":[1,2],\"inverseBindMatrices\":7}]," MESH(
+                "\"POSITION\":0,\"NORMAL\":3,\"JOINTS_0\":4,\"WEIGHTS_0\":2,\"JOINTS_1\":5,"
+                "\"WEIGHTS_1\":6",
+                ""),
+            wrong == 2 ? "" : ",2");
+        if (wrong != 0) {
+            refuse_made(m, rest, parts[wrong]);
+            continue;
+        }
+        OWNED(vsh_model) *model = read_made(m, rest);
+        assert_corner(model, 0, 0, 0, 4, 0);                   /* half of a joint is all of it */
+        assert_corner(model, 0, 1, 0.5 * (0 + 9), 0.5 * 5, 0); /* two sets */
+        assert_corner(model, 0, 2, -1, 5, 0);                  /* turned */
+        assert_normal(model, 0, 0, 1, 0);
+    }
+}
+
+TEST(nodes_share_a_mesh_but_not_its_pose) {
+    for (int order = 0; order < 2; ++order) {
+        char rest[1024];
+        snprintf(
+            rest, sizeof rest,
+            "\"scenes\":[{\"nodes\":[%s,2]}],\"nodes\":[{\"mesh\":0},{\"mesh\":0,\"weights\":[2]},{\"mesh\":"
+            "0,\"skin\":0},{\"translation\":[0,8,0]}],\"skins\":[{\"joints\":[3]}],\"meshes\":[{"
+            "\"primitives\":[{\"attributes\":{\"POSITION\":0,\"JOINTS_0\":2,\"WEIGHTS_0\":3},\"targets\":[{"
+            "\"POSITION\":0}]}]}]",
+            order == 0 ? "0,1,3" : "1,0,3");
+        maker *m = begin();
+        static const uint8_t joints[16] = {0};
+        static const float weights[4][4] = {{1}, {1}, {1}, {1}};
+        add(m, joints, sizeof joints, "", UBYTES, 4, "VEC4", "");
+        add(m, weights, sizeof weights, "", FLOATS, 4, "VEC4", "");
+        OWNED(vsh_model) *model = read_made(m, rest);
+        assert_int_equal(vsh_model_mesh_count(model), 3);
+        assert_corner(model, order == 0 ? 0 : 1, 1, 1, 0, 0);
+        assert_corner(model, order == 0 ? 1 : 0, 1, 3, 0, 0);
+        assert_corner(model, 2, 1, 1, 8, 0);
+    }
+}
+
+/* --- what is refused */
+
+TEST(required_extensions_that_are_not_known_are_refused_by_name) {
+    static const struct {
+        const char *name, *advice;
+    } cases[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "to be seen"},
+                 {"KHR_mesh_quantization", NULL},      {"KHR_texture_transform", NULL},
+                 {"KHR_materials_unlit", NULL},        {"KHR_lights_punctual", NULL}};
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        char rest[1024];
+        snprintf(rest, sizeof rest, "\"extensionsRequired\":[\"%s\"]," ALONE MESH("\"POSITION\":0", ""),
+                 cases[i].name);
+        if (cases[i].advice != NULL) {
+            refuse_as(begin(), rest, VSH_ERROR_UNSUPPORTED, cases[i].name, cases[i].advice);
+        } else {
+            vsh_model_free(read_made(begin(), rest));
+        }
+    }
 }
 
 TEST(a_buffer_that_is_not_there_is_named) {
 #define BESIDE(uri)                                                                                          \
-    "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":48,\"uri\":\"" uri "\"}],\"scenes\":[{"   \
-    "\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}" \
-    "}]"                                                                                                     \
-    "}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}],"            \
-    "\"bufferViews\":[{\"buffer\":0,\"byteLength\":48}]}"
+    "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":48,\"uri\":\"" uri "\"}]," ALONE MESH(    \
+        "\"POSITION\":0",                                                                                    \
+        "") ",\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}],"      \
+            "\"bufferViews\":[{\"buffer\":0,\"byteLength\":48}]}"
     refused("a.gltf", BESIDE("my%20data.bin"), VSH_ERROR_READ, "my data.bin': cannot be read: No such file",
             "buffers[0]");
     refused("a.gltf", BESIDE("https://example.org/a.bin"), VSH_ERROR_UNSUPPORTED, "https://", "beside it");
-    write_bytes("my data.bin", corners, 48);
+    write_bytes("my data.bin", QUAD, 48);
     vsh_model_free(read_text("a.gltf", BESIDE("my%20data.bin")));
-    write_bytes("my data.bin", corners, 40);
+    write_bytes("my data.bin", QUAD, 40);
     refused("a.gltf", BESIDE("my%20data.bin"), VSH_ERROR_READ, "cut short: 40 bytes of 48", "buffers[0]");
     assert_int_equal(unlink(path_of("my data.bin").text), 0);
 #undef BESIDE
@@ -324,26 +483,19 @@ TEST(a_buffer_that_is_not_there_is_named) {
 
 TEST(what_is_out_of_range_is_refused) {
     static const struct {
-        const char *node, *primitive, *accessor, *part;
+        const char *rest, *part;
     } bad[] = {
-        {",\"children\":[0]", "", "", "nodes[0] is its own descendant"},
-        {",\"children\":[9]", "", "", "names node 9"},
-        {",\"children\":[-1]", "", "", "names node -1"},
-        {",\"translation\":[0,\"a\",0]", "", "", "nodes[0]: its transform"},
-        {"", "\"mode\":7,", "", "its mode is none"},
-        {"", "\"indices\":1,", "", "'indices' is 1"},
-        {"", "\"indices\":-1,", "", "'indices' is no index"},
-        {"", "\"indices\":0,", "", "its indices have 3 components"},
-        {"", "", ",\"byteOffset\":4", "pass the 48 bytes of bufferViews[0]"},
-        {"", "", ",\"byteOffset\":1e300", "count or byteOffset"},
-        {"", "", ",\"byteOffset\":-4", "count or byteOffset"},
-        {"", "", ",\"byteOffset\":9007199254740992", "pass the 48 bytes"},
+        {NODE(",\"children\":[0]") MESH("\"POSITION\":0", ""), "nodes[0] is its own descendant"},
+        {NODE(",\"children\":[9]") MESH("\"POSITION\":0", ""), "names node 9"},
+        {NODE(",\"children\":[-1]") MESH("\"POSITION\":0", ""), "names node -1"},
+        {NODE(",\"translation\":[0,\"a\",0]") MESH("\"POSITION\":0", ""), "nodes[0]: its transform"},
+        {ALONE MESH("\"POSITION\":0", ",\"mode\":7"), "its mode is none"},
+        {ALONE MESH("\"POSITION\":0", ",\"indices\":2"), "'indices' is 2"},
+        {ALONE MESH("\"POSITION\":0", ",\"indices\":-1"), "'indices' is no index"},
+        {ALONE MESH("\"POSITION\":0", ",\"indices\":0"), "its indices have 3 components"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
-        char rest[1024];
-        snprintf(rest, sizeof rest, ONE_MESH "," FOUR_CORNERS, bad[i].node, bad[i].primitive, "",
-                 bad[i].accessor, "", "");
-        refused_gltf(rest, corners, 48, VSH_ERROR_INPUT, bad[i].part, "");
+        refuse_made(begin(), bad[i].rest, bad[i].part);
     }
     refused("a.gltf", "{\"asset\":{\"version\":\"1.0\"}}", VSH_ERROR_UNSUPPORTED, "is glTF 1.0", "2.0");
     refused("a.gltf", "{}", VSH_ERROR_INPUT, "is no glTF", "");
@@ -359,25 +511,19 @@ TEST(nodes_deeper_than_the_limit_are_refused) {
                                  i + 1);
     }
     snprintf(rest + used, sizeof rest - used, ",{}]");
-    refused_gltf(rest, corners, 48, VSH_ERROR_LIMIT, "deeper than 1024", "");
+    refuse_as(begin(), rest, VSH_ERROR_LIMIT, "deeper than 1024", "");
 }
 
 /* What an accessor claims is held against the limit before memory is taken. */
 TEST(claims_of_memory_are_checked) {
-    write_bytes("a.gltf", "", 0);
-    char rest[1024];
-    snprintf(rest, sizeof rest,
-             ONE_MESH ",\"accessors\":[{\"componentType\":5126,\"count\":4000000000,\"type\":\"VEC3\"}]", "",
-             "", "");
-    const char *text = gltf_of(rest, corners, 48);
+    FREED maker *m = begin();
+    strcat(m->accessors, ",{\"componentType\":5126,\"count\":4000000000,\"type\":\"VEC3\"}");
+    const char *text = text_of(m, ALONE MESH("\"POSITION\":2", ""));
     write_bytes("a.gltf", text, strlen(text));
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 100000000;
+    const vsh_run run = run_within(100000000);
     vsh_model *model;
     assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -48,7 +48,7 @@ static void assert_vector(const double *given, double x, double y, double z) {
 
 TEST(lights_stand_where_their_nodes_do) {
     for (int reader = 0; reader < 2; ++reader) {
-        vsh_model *model = read_gltf_by(reader != 0, lit_json(nodes, lights));
+        OWNED(vsh_model) *model = read_gltf_by(reader != 0, lit_json(nodes, lights));
         assert_int_equal(vsh_model_light_count(model), 3);
         const vsh_model_light sun = vsh_model_get_light(model, 0), lamp = vsh_model_get_light(model, 1);
         const vsh_model_light spot = vsh_model_get_light(model, 2);
@@ -68,17 +68,15 @@ TEST(lights_stand_where_their_nodes_do) {
         assert_vector(spot.position, 1, 2, 3);
         assert_vector(spot.direction, -1, 0, 0);
         assert_true(spot.inner_angle == 0.125 && spot.outer_angle == 0.5 && spot.intensity == 2.0);
-        vsh_model_free(model);
     }
-    vsh_model *model = read_text("a.obj", quad_obj);
+    OWNED(vsh_model) *model = read_text("a.obj", quad_obj);
     assert_int_equal(vsh_model_light_count(model), 0);
-    vsh_model_free(model);
 }
 
 TEST(as_a_scenes_they_have_names_sizes_and_falloff) {
     vsh_light *made = NULL;
     size_t count = 0;
-    vsh_model *model = read_gltf_by(
+    OWNED(vsh_model) *model = read_gltf_by(
         false, lit_json("{\"name\":\"Key light\",\"translation\":[1,2,3],\"children\":[2,3]," CARRIES(
                             "0") "},"
                                  "{\"name\":\"Key_light\"," CARRIES("1") "},{" CARRIES("2") "}",
@@ -107,7 +105,6 @@ TEST(as_a_scenes_they_have_names_sizes_and_falloff) {
     assert_int_equal(vsh_lights_from_model(model, 0.1, 0.0, -1.0, &made, &count, &failure),
                      VSH_ERROR_ARGUMENT);
     assert_int_equal(vsh_lights_from_model(NULL, 0.1, 0.0, 0.0, &made, &count, &failure), VSH_ERROR_ARGUMENT);
-    vsh_model_free(model);
 }
 
 TEST(wrong_lights_are_refused_by_their_number) {
@@ -170,9 +167,4 @@ TEST(what_a_reader_tells_of_lights_is_refused_or_in_range) {
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
-int main(int argc, char **argv) {
-    if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
-        return vsh_reader_serve(argc, argv);
-    }
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -40,7 +40,7 @@ static const char textures[] = "\"textures\":[{\"source\":0,\"sampler\":0}],\"sa
 
 TEST(masked_materials_come_with_their_image) {
     for (int reader = 0; reader < 2; ++reader) {
-        vsh_model *model = read_gltf_by(reader != 0, material_json(LEAF(",\"texCoord\":3"), textures));
+        OWNED(vsh_model) *model = read_gltf_by(reader != 0, material_json(LEAF(",\"texCoord\":3"), textures));
         assert_int_equal(vsh_model_material_count(model), 2);
         assert_int_equal(vsh_model_mesh_material(model, 0), 1);
         assert_int_equal(vsh_model_mesh_material(model, 1), -1);
@@ -59,12 +59,10 @@ TEST(masked_materials_come_with_their_image) {
         assert_int_equal(leaf.image_size, sizeof image);
         assert_memory_equal(leaf.image, image, sizeof image);
         assert_null(leaf.image_path);
-        vsh_model_free(model);
     }
-    vsh_model *model = read_text("a.obj", quad_obj);
+    OWNED(vsh_model) *model = read_text("a.obj", quad_obj);
     assert_int_equal(vsh_model_material_count(model), 0);
     assert_int_equal(vsh_model_mesh_material(model, 0), -1);
-    vsh_model_free(model);
 }
 
 static void assert_maps(const vsh_model_material *m, double u, double v, double to_u, double to_v) {
@@ -167,7 +165,7 @@ TEST(uvs_that_a_packer_made_integers_are_what_textures_see) {
     };
     for (size_t i = 0; i < 2 * sizeof cases / sizeof cases[0]; ++i) {
         const size_t c = i / 2;
-        vsh_model *model =
+        OWNED(vsh_model) *model =
             read_gltf_by(i % 2 != 0, packed_json(cases[c].material, cases[c].one, cases[c].other));
         const double expected[2][2] = {{cases[c].u, cases[c].v}, {cases[c].other_u, cases[c].other_v}};
         for (size_t m = 0; m < 2; ++m) {
@@ -178,7 +176,6 @@ TEST(uvs_that_a_packer_made_integers_are_what_textures_see) {
         }
         const vsh_model_material told = vsh_model_get_material(model, 0);
         assert_int_equal(told.uv_transform[0] != 1.0, cases[c].left);
-        vsh_model_free(model);
     }
 }
 
@@ -218,14 +215,13 @@ TEST(a_mask_that_cannot_be_had_is_left_out_with_a_warning) {
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         for (int reader = 0; reader < 2; ++reader) {
-            vsh_model *model = read_gltf_by(reader != 0, material_json(LEAF(""), bad[i].rest));
+            OWNED(vsh_model) *model = read_gltf_by(reader != 0, material_json(LEAF(""), bad[i].rest));
             const vsh_model_material leaf = vsh_model_get_material(model, 1);
             assert_null(leaf.image);
             assert_null(leaf.image_path);
             if (strstr(warnings, bad[i].part) == NULL || strstr(warnings, "its mask is ignored") == NULL) {
                 fail_msg("'%s', expected '%s'", warnings, bad[i].part);
             }
-            vsh_model_free(model);
         }
     }
 }
@@ -273,9 +269,4 @@ TEST(a_path_that_a_reader_leads_out_of_the_folder_is_refused) {
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
-int main(int argc, char **argv) {
-    if (argc > 1 && strcmp(argv[1], VSH_READER_ARGUMENT) == 0) {
-        return vsh_reader_serve(argc, argv);
-    }
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

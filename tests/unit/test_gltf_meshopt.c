@@ -95,7 +95,7 @@ TEST(what_was_packed_comes_out_again) {
     make_sheet();
     for (int k = 0; k < 4; ++k) {
         pack_sheet(k % 2 == 0, k < 2 ? 2 : 4);
-        vsh_model *model = read_text("a.gltf", packed_json());
+        OWNED(vsh_model) *model = read_text("a.gltf", packed_json());
         const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
         assert_int_equal(mesh.vertex_count, VERTICES);
         assert_int_equal(3 * mesh.triangle_count, CORNERS);
@@ -107,7 +107,6 @@ TEST(what_was_packed_comes_out_again) {
                 assert_int_equal(a[c], b[(c + turn) % 3]);
             }
         }
-        vsh_model_free(model);
     }
 }
 
@@ -140,7 +139,7 @@ TEST(directions_on_an_octahedron_come_out_again) {
         views[1] = (view){.mode = "ATTRIBUTES", .filter = "OCTAHEDRAL", .count = VERTICES, .stride = stride};
         views[1].size = meshopt_encodeVertexBuffer(views[1].bytes, PACKED, folded, VERTICES, stride);
         normal_type = bytes == 1 ? "5120,\"normalized\":true" : "5122,\"normalized\":true";
-        vsh_model *model = read_text("a.gltf", packed_json());
+        OWNED(vsh_model) *model = read_text("a.gltf", packed_json());
         const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
         meshopt_decodeFilterOct(kept, VERTICES, stride);
         for (size_t v = 0; v < VERTICES; ++v) {
@@ -154,7 +153,6 @@ TEST(directions_on_an_octahedron_come_out_again) {
                 assert_true(fabs(value * most - two) <= 1.01); /* the library's own, by rougher roots */
             }
         }
-        vsh_model_free(model);
     }
 }
 
@@ -219,7 +217,7 @@ TEST(quaternions_come_out_again) {
         "\"EXT_meshopt_compression\":{\"buffer\":0,\"byteOffset\":36,\"byteLength\":%zu,\"byteStride\":8,"
         "\"count\":%d,\"mode\":\"ATTRIBUTES\",\"filter\":\"QUATERNION\"}}}]}",
         36 + size, text, COUNT, 8 * COUNT, size, COUNT);
-    vsh_model *model = read_text("a.gltf", json);
+    OWNED(vsh_model) *model = read_text("a.gltf", json);
     assert_int_equal(vsh_model_mesh_count(model), COUNT);
     for (size_t i = 0; i < COUNT; ++i) {
         const double x = (double)given[i][0], y = (double)given[i][1], z = (double)given[i][2];
@@ -230,7 +228,6 @@ TEST(quaternions_come_out_again) {
         assert_true(fabs(m[8] - 2.0 * (x * z - y * w)) < 4e-4);
         assert_true(fabs(m[9] - 2.0 * (y * z + x * w)) < 4e-4);
     }
-    vsh_model_free(model);
 }
 
 static void refused_with(vsh_result code, const char *part) {
@@ -314,13 +311,10 @@ TEST(what_is_unpacked_is_held_against_the_limit) {
     pack_sheet(true, 2);
     const char *json = packed_json();
     write_bytes("a.gltf", json, strlen(json));
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 6 * strlen(json) + 1000;
+    vsh_run run = run_within(6 * strlen(json) + 1000);
     vsh_model *model;
     assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

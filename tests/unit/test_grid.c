@@ -1,4 +1,4 @@
-/* Grids of distance callbacks and trees. test_grid_mesh.c has meshes, test_grid_union.c unions. */
+/* Grids of distance callbacks and trees, and unions of grids. test_grid_mesh.c has meshes. */
 #include "grids.h"
 #include "testing.h"
 
@@ -10,7 +10,7 @@ TEST(a_sphere_is_exact_in_its_band) {
     const vsh_grid_options options = with_voxel(0.02);
     OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
-    assert_true(worst_error(grid, unit_sphere, 2.999, 2.999) < 1e-5);
+    assert_less(worst_error(grid, unit_sphere, 2.999, 2.999), 1e-5);
     assert_int_equal(wrong_blocks(grid, unit_sphere, 10), 0);
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
@@ -77,8 +77,8 @@ TEST(the_work_follows_the_area) {
         calls[i] = s.calls;
     }
     const double voxels = 4.0 * 3.14159265 / (0.01 * 0.01);
-    assert_true((double)calls[1] < 20.0 * voxels);          /* layers of voxels, of which the band has 6 */
-    assert_true((double)calls[1] < 4.4 * (double)calls[0]); /* 4: area, 8: volume */
+    assert_less((double)calls[1], 20.0 * voxels);          /* layers of voxels, of which the band has 6 */
+    assert_less((double)calls[1], 4.4 * (double)calls[0]); /* 4: area, 8: volume */
 }
 
 TEST(far_from_the_origin_nothing_changes) {
@@ -105,14 +105,12 @@ TEST(a_room_inside_a_solid_stays_a_room) {
     OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     const double worst = worst_error(grid, hollow_truth, 2.9, 2.9);
-    print_message("re-distanced hollow sphere: worst error %.3f voxels\n", worst);
-    assert_true(worst < 0.15);
+    assert_less(worst, 0.15);
     assert_int_equal(wrong_blocks(grid, hollow_truth, 10), 0);
 }
 
 /* A bound that is too small by a third, and a cube root's worth of bend: only its zero can be trusted. */
 static double squashed(void *user, const double p[3]) {
-    (void)user;
     const double d = unit_sphere(p);
     return 0.6 * d / (1.0 + fabs(d));
 }
@@ -124,19 +122,16 @@ TEST(a_bound_becomes_a_distance) {
     OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
     const double worst = worst_error(grid, unit_sphere, 4.9, 4.9);
-    print_message("re-distanced sphere: worst error %.3f voxels\n", worst);
-    assert_true(worst < 0.15);
+    assert_less(worst, 0.15);
     assert_int_equal(wrong_blocks(grid, unit_sphere, 10), 0);
 }
 
 static double hole_in_the_middle(void *user, const double p[3]) {
-    (void)user;
     const double d = unit_sphere(p);
     return d < -0.02 && d > -0.03 ? NAN : d;
 }
 
 static double nowhere_near(void *user, const double p[3]) {
-    (void)user;
     return 5.0 + 0.1 * p[0];
 }
 
@@ -201,27 +196,25 @@ TEST(too_small_a_voxel_is_refused_before_memory_is_taken) {
     options = with_voxel(1.6e-5);
     assert_fails(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
                  "this machine's memory");
-    assert_true(s.calls < 100000);
+    assert_less(s.calls, 100000);
     struct rusage after;
     assert_int_equal(getrusage(RUSAGE_SELF, &after), 0);
-    assert_true(after.ru_maxrss - before.ru_maxrss < 50000); /* KB */
+    assert_less(after.ru_maxrss - before.ru_maxrss, 50000); /* KB */
     options = with_voxel(0.005);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 10000000;
+    vsh_run run = run_within(10000000);
     assert_fails(vsh_grid_from_distance(&field, &options, &run, &grid, &failure), VSH_ERROR_LIMIT,
                  "over the memory limit of 10 MB");
     run.memory_limit = 500000000;
     assert_ok(vsh_grid_from_distance(&field, &options, &run, &grid, &failure));
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
-    assert_true(info.bytes < run.memory_limit);
+    assert_less(info.bytes, run.memory_limit);
 }
 
 /* The megabytes that a limit of one byte is told. */
 static double foretold(const vsh_sdf *sdf, const vsh_grid_instance *instance,
                        const vsh_grid_options *options) {
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1;
+    vsh_run run = run_within(1);
     vsh_grid *grid = NULL;
     const vsh_result result = sdf != NULL ? vsh_grid_from_sdf(sdf, options, &run, &grid, &failure)
                                           : vsh_grid_unite(instance, 1, options, &run, &grid, &failure);
@@ -244,8 +237,7 @@ TEST(re_distancing_is_foretold_with_the_band_that_it_makes) {
             options.half_width = half_widths[i];
             const double need = foretold(anew ? &sdf : NULL, &instance, &options);
             for (int over = 0; over < 2; ++over) {
-                vsh_run run = vsh_run_default();
-                run.memory_limit = (uint64_t)(need * 1e6 * (over ? 1.2 : 0.95));
+                vsh_run run = run_within((uint64_t)(need * 1e6 * (over ? 1.2 : 0.95)));
                 OWNED(vsh_grid) *grid = NULL;
                 failure.message[0] = '\0';
                 const vsh_result result = anew
@@ -258,11 +250,9 @@ TEST(re_distancing_is_foretold_with_the_band_that_it_makes) {
                 }
                 vsh_grid_info info;
                 vsh_grid_get_info(grid, &info);
-                print_message("half width %g: %g MB foretold, %g MB made\n", half_widths[i], need,
-                              (double)info.bytes / 1e6);
                 /* distances, and the leaves that are made of them */
                 assert_true(need * 1e6 > 2.0 * (double)info.bytes);
-                assert_true(need * 1e6 < 9.0 * (double)info.bytes);
+                assert_less(need * 1e6, 9.0 * (double)info.bytes);
             }
         }
     }
@@ -291,6 +281,124 @@ TEST(progress_rises_to_one_and_can_cancel) {
     }
 }
 
-int main(void) {
-    return run_all_tests(NULL, NULL);
+/* --- unions */
+
+static vsh_grid *ball_grid(double x, double radius, double voxel) {
+    sphere s = {{x, 0, 0}, radius, 0};
+    const vsh_distance field = sphere_field(&s);
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
+    return grid;
+}
+
+TEST(one_grid_alone_is_shared_as_it_is) {
+    vsh_grid *ball = ball_grid(0.0, 1.0, 0.03);
+    const vsh_grid_instance instance = {ball, NULL};
+    OWNED(vsh_grid) *same = NULL;
+    assert_ok(vsh_grid_unite(&instance, 1, NULL, NULL, &same, &failure));
+    vsh_grid *const given = ball;
+    assert_same_leaves(given, same, 0.0f);
+    vsh_grid_free(given);
+    assert_less(worst_error(same, unit_sphere, 2.95, 2.95), 1e-4);
+}
+
+/* Shifts by whole voxels that are no whole leaves: the values are those of the closed form. */
+TEST(grids_on_one_lattice_are_shifted_and_keep_their_values) {
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.03);
+    const double aside[12] = {1, 0, 0, 27 * 0.03, 0, 1, 0, 0, 0, 0, 1, 0};
+    const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, aside}};
+    OWNED(vsh_grid) *both = NULL;
+    assert_ok(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure));
+    FREED_BY(free_leaves) leaves all = leaves_of(both);
+    for (size_t i = 0; i < 512 * all.count; ++i) {
+        double p[3];
+        const double value = value_at(&all, i, p), q[3] = {p[0] - 27 * 0.03, p[1], p[2]};
+        assert_near(value, fmax(-0.09, fmin(0.09, fmin(unit_sphere(p), unit_sphere(q)))), 1e-6);
+    }
+}
+
+static double moved_sphere(const double p[3]) { /* twice as large, its middle at 1, 2, 3 */
+    const double q[3] = {0.5 * (p[0] - 1.0), 0.5 * (p[1] - 2.0), 0.5 * (p[2] - 3.0)};
+    return 2.0 * unit_sphere(q);
+}
+
+TEST(a_turned_mirrored_scaled_grid_is_measured_anew) {
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.03);
+    const double c = 2.0 * cos(0.5), s = 2.0 * sin(0.5);
+    const double turned[12] = {-c, s, 0, 1, s, c, 0, 2, 0, 0, 2, 3};
+    const vsh_grid_instance instance = {ball, turned};
+    const double voxels[] = {0.0, 0.045, 0.09};
+    for (int i = 0; i < 3; ++i) {
+        OWNED(vsh_grid) *moved = NULL;
+        const vsh_grid_options options = with_voxel(voxels[i]);
+        assert_ok(vsh_grid_unite(&instance, 1, &options, NULL, &moved, &failure));
+        vsh_grid_info info;
+        vsh_grid_get_info(moved, &info);
+        assert_float_equal(info.voxel_size, i == 0 ? 0.06 : voxels[i], 1e-9);
+        const double worst = worst_error(moved, moved_sphere, 2.9, 2.9);
+        assert_less(worst, 0.15);
+        assert_int_equal(wrong_blocks(moved, moved_sphere, 10), 0);
+    }
+}
+
+TEST(rooms_stay_open_in_a_union_of_different_lattices) {
+    const vsh_sdf sdf = hollow_sphere();
+    const vsh_grid_options options = with_voxel(0.03);
+    OWNED(vsh_grid) *room = NULL;
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &room, &failure));
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
+    const double turned[12] = {0.12, -0.16, 0, 0, 0.16, 0.12, 0, 0, 0, 0, 0.2, 0};
+    const vsh_grid_instance instances[2] = {{ball, turned}, {room, NULL}};
+    OWNED(vsh_grid) *both = NULL;
+    assert_ok(vsh_grid_unite(instances, 2, &options, NULL, &both, &failure));
+    assert_less(worst_error(both, room_with_a_ball, 2.9, 2.9), 0.15);
+    assert_int_equal(wrong_blocks(both, room_with_a_ball, 8), 0);
+}
+
+TEST(threads_do_not_show_in_unions) {
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
+    const double turned[12] = {0.6, -0.8, 0, 0.5, 0.8, 0.6, 0, 0, 0, 0, 1, 0.1};
+    const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, turned}};
+    vsh_grid *first = NULL;
+    const int32_t threads[3] = {1, 2, 5};
+    for (int i = 0; i < 3; ++i) {
+        const vsh_run run = run_on(threads[i]);
+        vsh_grid *both = NULL;
+        assert_ok(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure));
+        if (first != NULL) {
+            assert_same_leaves(first, both, 0.0f);
+            vsh_grid_free(both);
+        } else {
+            first = both;
+        }
+    }
+    vsh_grid_free(first);
+}
+
+TEST(bad_unions_are_refused_with_the_reason) {
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
+    const double uneven[12] = {1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1, 0};
+    const double sheared[12] = {1, 0.3, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+    const double lost[12] = {1, 0, 0, NAN, 0, 1, 0, 0, 0, 0, 1, 0};
+    const double far_away[12] = {1, 0, 0, 1e9, 0, 1, 0, 0, 0, 0, 1, 0};
+    vsh_grid *both = NULL;
+    vsh_grid_instance instances[2] = {{ball, NULL}, {ball, uneven}};
+    assert_fails(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure), VSH_ERROR_ARGUMENT,
+                 "length 1, 2, 1");
+    instances[1].transform = sheared;
+    assert_fails(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure), VSH_ERROR_ARGUMENT, "instance 1");
+    instances[1].transform = lost;
+    assert_fails(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure), VSH_ERROR_ARGUMENT, "instance 1");
+    instances[1].transform = far_away;
+    assert_fails(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure), VSH_ERROR_LIMIT, "longest side");
+    instances[1].grid = NULL;
+    assert_fails(vsh_grid_unite(instances, 2, NULL, NULL, &both, &failure), VSH_ERROR_ARGUMENT, "no grid");
+    assert_fails(vsh_grid_unite(NULL, 0, NULL, NULL, &both, &failure), VSH_ERROR_ARGUMENT, "no grids");
+    const vsh_grid_options options = with_voxel(2e-5);
+    assert_fails(vsh_grid_unite(instances, 1, &options, NULL, &both, &failure), VSH_ERROR_LIMIT, "memory");
+    vsh_run run = run_within(1000000);
+    instances[1] = instances[0];
+    assert_fails(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure), VSH_ERROR_LIMIT, "limit of 1 MB");
+    assert_null(both);
 }

@@ -1,359 +1,447 @@
-/* Grids of meshes. */
+/* Level sets of meshes, against closed forms: solids, what is open, and meshes that nobody should make. */
 #include "grids.h"
+#include "shapes.h"
 #include "testing.h"
 
-typedef struct model {
-    float *positions;
-    uint32_t *indices;
-    vsh_mesh mesh;
-} model;
+static const double VOXEL = 0.05;
+static const double ORIGIN[3] = {0, 0, 0};
+static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
 
-/* A sphere of `rows` × 2 `rows` quads, halved; outward, or inward where `inverted`. */
-static model make_sphere(int rows, double radius, int inverted) {
-    const int columns = 2 * rows;
-    const size_t vertices = (size_t)(rows - 1) * (size_t)columns + 2;
-    const size_t triangles = 2 * (size_t)(rows - 1) * (size_t)columns;
-    model m = {malloc(vertices * 3 * sizeof(float)), malloc(triangles * 3 * sizeof(uint32_t)), {0}};
-    assert_non_null(m.positions);
-    assert_non_null(m.indices);
-    float *p = m.positions;
-    for (int row = 1; row < rows; ++row) {
-        for (int column = 0; column < columns; ++column) {
-            const double polar = 3.14159265358979 * row / rows;
-            const double around = 3.14159265358979 * column / rows;
-            *p++ = (float)(radius * sin(polar) * cos(around));
-            *p++ = (float)(radius * cos(polar));
-            *p++ = (float)(radius * sin(polar) * sin(around));
-        }
-    }
-    const float poles[6] = {0, (float)radius, 0, 0, (float)-radius, 0};
-    memcpy(p, poles, sizeof poles);
-    const uint32_t top = (uint32_t)vertices - 2, bottom = (uint32_t)vertices - 1;
-    uint32_t *t = m.indices;
-    for (int row = 0; row < rows; ++row) {
-        for (int column = 0; column < columns; ++column) {
-            const uint32_t next = (uint32_t)((column + 1) % columns), here = (uint32_t)column;
-            const uint32_t up = (uint32_t)((row - 1) * columns), down = (uint32_t)(row * columns);
-            const uint32_t quad[4] = {row == 0 ? top : up + here, row == 0 ? top : up + next,
-                                      row == rows - 1 ? bottom : down + next,
-                                      row == rows - 1 ? bottom : down + here};
-            if (row > 0) {
-                *t++ = quad[0];
-                *t++ = quad[inverted ? 2 : 1];
-                *t++ = quad[inverted ? 1 : 2];
-            }
-            if (row < rows - 1) {
-                *t++ = quad[0];
-                *t++ = quad[inverted ? 3 : 2];
-                *t++ = quad[inverted ? 2 : 3];
-            }
-        }
-    }
-    m.mesh = (vsh_mesh){.name = "ball",
-                        .positions = m.positions,
-                        .indices = m.indices,
-                        .vertex_count = vertices,
-                        .triangle_count = triangles};
-    return m;
+enum { MANY = 1000000 };
+
+static char warned[4096];
+
+static void keep_warning(void *user, const char *message) {
+    snprintf(warned + strlen(warned), sizeof warned - strlen(warned), "%s\n", message);
 }
 
-static void free_model(model *m) {
-    free(m->positions);
-    free(m->indices);
+static void assert_warned_once(const char *part) {
+    assert_non_null(strstr(warned, part));
+    assert_ptr_equal(strchr(warned, '\n'), warned + strlen(warned) - 1);
 }
 
-static vsh_grid *grid_of(const vsh_mesh *meshes, size_t count, double voxel, const vsh_run *run) {
-    const vsh_grid_options options = with_voxel(voxel);
+static vsh_grid *grid_of(const vsh_mesh *meshes, size_t count, vsh_grid_options options) {
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    run.notes = 1;
+    warned[0] = '\0';
     vsh_grid *grid = NULL;
-    assert_ok(vsh_grid_from_meshes(meshes, count, &options, run, &grid, &failure));
+    assert_ok(vsh_grid_from_meshes(meshes, count, &options, &run, &grid, &failure));
     return grid;
 }
 
-static char last_warning[1024];
-
-static void keep_warning(void *user, const char *message) {
-    ++*(int *)user;
-    snprintf(last_warning, sizeof last_warning, "%s", message);
+static vsh_grid *grid_of_shape(const shape *s, double voxel) {
+    const vsh_mesh mesh = shape_mesh(s, "mesh");
+    return grid_of(&mesh, 1, with_voxel(voxel));
 }
+
+/* From -1 to 1, of eight vertices. */
+static vsh_mesh cube(void) {
+    static float corners[24];
+    return box_mesh(corners, LOW, HIGH);
+}
+
+static double ball(const double p[3], double radius) {
+    return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - radius;
+}
+
+static double shell_thickness(const vsh_grid *grid) {
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    return info.shell_thickness;
+}
+
+/* Within `bound` voxels of the truth, and of its sign everywhere; inside down to `inside` voxels. Frees the
+ * grid. */
+static void assert_is(vsh_grid *grid, truth_fn *truth, double inside, double bound, const char *what) {
+    const double worst = worst_error(grid, truth, inside, 2.95);
+    const size_t wrong = wrong_blocks(grid, truth, 10);
+    assert_less(worst, bound);
+    assert_int_equal(wrong, 0);
+    vsh_grid_free(grid);
+}
+
+/* --- closed solids */
 
 TEST(a_fine_mesh_of_a_sphere_is_the_sphere) {
-    for (int inverted = 0; inverted < 2; ++inverted) {
-        model ball = make_sphere(150, 1.0, inverted);
-        ball.mesh.solidity = inverted ? VSH_SOLIDITY_SOLID : VSH_SOLIDITY_AUTO;
-        vsh_grid *grid = grid_of(&ball.mesh, 1, 0.03, NULL);
-        const double worst = worst_error(grid, unit_sphere, 2.95, 2.95);
-        print_message("mesh of a sphere: worst error %.3f voxels\n", worst);
-        assert_true(worst < 0.1);
-        assert_int_equal(wrong_blocks(grid, unit_sphere, 10), 0);
-        vsh_grid_free(grid);
-        free_model(&ball);
-    }
+    FREED shape *s = shape_new();
+    shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 254);
+    vsh_mesh mesh = shape_mesh(s, "ball");
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1, "ball");
+    shape_turn(s, 0);
+    mesh.solidity = VSH_SOLIDITY_SOLID;
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1, "ball, turned inside out");
+    shape_turn(s, 0);
+    shape_turn(s, s->triangles - 2000);
+    mesh.solidity = VSH_SOLIDITY_AUTO;
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1, "ball with turned faces");
 }
-
-static double unit_cube(const double p[3]) {
-    const double x = fabs(p[0]) - 1.0, y = fabs(p[1]) - 1.0, z = fabs(p[2]) - 1.0;
-    const double a = fmax(x, 0.0), b = fmax(y, 0.0), c = fmax(z, 0.0);
-    return sqrt(a * a + b * b + c * c) + fmin(fmax(x, fmax(y, z)), 0.0);
-}
-
-static const float cube_positions[24] = {-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1,
-                                         -1, -1, 1,  1, -1, 1,  1, 1, 1,  -1, 1, 1};
-
-static const uint32_t cube_indices[36] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
-                                          3, 6, 2, 3, 7, 6, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
-
-static const vsh_mesh cube = {.name = "cube",
-                              .positions = cube_positions,
-                              .indices = cube_indices,
-                              .vertex_count = 8,
-                              .triangle_count = 12};
 
 TEST(few_large_triangles_are_exact) {
-    OWNED(vsh_grid) *grid = grid_of(&cube, 1, 0.03, NULL);
-    assert_true(worst_error(grid, unit_cube, 2.95, 2.95) < 0.02);
-    assert_int_equal(wrong_blocks(grid, unit_cube, 8), 0);
+    const vsh_mesh mesh = cube();
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_cube, 2.95, 0.02, "cube");
 }
 
 TEST(a_mesh_far_away_and_mirrored_is_the_same) {
     const double far_away[12] = {-1, 0, 0, 1e7, 0, 1, 0, 0, 0, 0, 1, -4e6};
-    vsh_mesh moved = cube;
-    moved.transform = far_away;
-    OWNED(vsh_grid) *here = grid_of(&cube, 1, 0.03125, NULL);
-    OWNED(vsh_grid) *there = grid_of(&moved, 1, 0.03125, NULL);
+    vsh_mesh mesh = cube();
+    OWNED(vsh_grid) *here = grid_of(&mesh, 1, with_voxel(0.03125));
+    mesh.transform = far_away;
+    OWNED(vsh_grid) *there = grid_of(&mesh, 1, with_voxel(0.03125));
     assert_same_leaves(here, there, 1e-6f);
 }
+
+static double beside(const double p[3]) {
+    const double q[3] = {p[0] - 1.013, p[1] - 1.013, p[2] - 1.013};
+    return to_box(q, 1.0);
+}
+
+/* Half a voxel off the surface signs are those of the union. Distances are its own outside; inside they may
+ * be to faces that lie within. Along the seam a voxel is signed by the nearer triangle: a groove of half a
+ * voxel. */
+TEST(boxes_that_cross_in_one_mesh_or_two_are_their_union) {
+    const double low[3] = {0.013, 0.013, 0.013}, high[3] = {2.013, 2.013, 2.013}, voxel = 0.047;
+    FREED shape *s[2] = {shape_new()};
+    FREED shape *other = shape_new();
+    for (int split = 0; split < 2; ++split) {
+        s[1] = split ? other : s[0];
+        s[0]->vertices = s[0]->triangles = 0;
+        shape_box(s[0], LOW, HIGH, ALL_SIDES);
+        shape_box(s[1], low, high, ALL_SIDES);
+        const vsh_mesh meshes[2] = {shape_mesh(s[0], "one"), shape_mesh(s[1], "other")};
+        OWNED(vsh_grid) *grid = grid_of(meshes, split ? 2 : 1, with_voxel(voxel));
+        FREED_BY(free_leaves) leaves all = leaves_of(grid);
+        for (size_t n = 0; n < 512 * all.count; ++n) {
+            double p[3];
+            const double value = value_at(&all, n, p), a = to_box(p, 1.0), b = beside(p), truth = fmin(a, b);
+            assert_true(fabs(truth) <= 0.5 * voxel || (value < 0.0) == (truth < 0.0));
+            const double bound = fabs(a) < voxel && fabs(b) < voxel ? 0.5 : 0.1;
+            assert_true(truth <= 0.0 || truth >= 2.9 * voxel || fabs(value - truth) < bound * voxel);
+        }
+    }
+}
+
+/* --- what is in what */
+
+static double dome_and_cube(const double p[3]) {
+    const double d = ball(p, 3.0);
+    return fmin(fmax(-d, d - 2.0 * VOXEL), to_box(p, 1.0));
+}
+
+static double dome_of_sheets(const double p[3]) {
+    return fmin(fabs(ball(p, 3.0)) - VOXEL, to_box(p, 1.0));
+}
+
+TEST(a_sky_dome_leaves_what_it_holds_and_one_that_looks_outwards_holds_air) {
+    FREED shape *s = shape_new();
+    shape_ball(s, ORIGIN, 3.0, -1.0, 1.0, 128);
+    const size_t dome = s->triangles;
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    assert_is(grid_of_shape(s, VOXEL), dome_of_sheets, 0.9, 0.1, "dome");
+    shape_turn(s, 0);
+    shape_turn(s, dome);
+    vsh_grid *grid = grid_of_shape(s, VOXEL);
+    assert_true(shell_thickness(grid) == 0.0);
+    assert_is(grid, dome_and_cube, 0.9, 0.1, "sky dome");
+}
+
+static double house(const double p[3]) {
+    return fmin(fmax(to_box(p, 2.0), -to_box(p, 1.0)), to_box(p, 0.5));
+}
+
+TEST(houses_have_rooms_with_furniture_in_one_mesh_or_many) {
+    static const double half[3] = {0.5, 1.0, 2.0}, mirrored[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0};
+    for (int split = 0; split < 2; ++split) {
+        shape *s[3];
+        vsh_mesh meshes[3];
+        for (int i = 0; i < 3; ++i) {
+            const double low[3] = {-half[i], -half[i], -half[i]}, high[3] = {half[i], half[i], half[i]};
+            s[i] = i == 0 || split ? shape_new() : s[0];
+            const size_t first = s[i]->triangles;
+            shape_box(s[i], low, high, ALL_SIDES);
+            if (i == 1) {
+                shape_turn(s[i], first);
+            }
+            meshes[i] = shape_mesh(s[i], "part");
+        }
+        meshes[0] = shape_mesh(s[0], "house");
+        for (int turned = 0; turned < 2; ++turned) {
+            for (int i = 0; i < 3; ++i) {
+                meshes[i].transform = turned ? mirrored : NULL;
+            }
+            assert_is(grid_of(meshes, split ? 3 : 1, with_voxel(VOXEL)), house, 2.9, 0.05, "house");
+        }
+        for (int i = 0; i < (split ? 3 : 1); ++i) {
+            free(s[i]);
+        }
+    }
+}
+
+static double room(const double p[3]) { /* walls of two voxels around the cube */
+    const double d = to_box(p, 1.0);
+    return fmax(-d, d - 2.0 * VOXEL);
+}
+
+TEST(an_inverted_mesh_is_a_room_or_the_same_solid_if_asked) {
+    FREED shape *s = shape_new();
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    shape_turn(s, 0);
+    vsh_mesh mesh = shape_mesh(s, "cube");
+    assert_is(grid_of(&mesh, 1, with_voxel(VOXEL)), room, 0.9, 0.02, "room");
+    mesh.solidity = VSH_SOLIDITY_SOLID;
+    assert_is(grid_of(&mesh, 1, with_voxel(VOXEL)), unit_cube, 2.9, 0.02, "solid");
+}
+
+TEST(the_door_of_a_room_stays_open) {
+    FREED shape *s = shape_new();
+    shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
+    shape_turn(s, 0);
+    OWNED(vsh_grid) *grid = grid_of_shape(s, VOXEL);
+    assert_true(shell_thickness(grid) == 0.0);
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
+    size_t compared = 0;
+    for (size_t n = 0; n < 512 * all.count; ++n) {
+        double p[3];
+        const double value = value_at(&all, n, p), truth = room(p);
+        const bool doorway = fabs(p[0]) < 0.8 && fabs(p[2]) < 0.8 && p[1] < -0.5;
+        const bool air = to_box(p, 1.0)<-0.01 * VOXEL, wall = p[1]> - 0.7 && fabs(truth) < 0.9 * VOXEL;
+        assert_true(!(doorway || air) || value > 0.0);
+        assert_true(!wall || fabs(value - truth) < 0.1 * VOXEL);
+        compared += doorway || air || wall;
+    }
+    assert_true(compared > 8000);
+}
+
+static double room_of_sheets(const double p[3]) {
+    return fabs(to_box(p, 1.0)) - VOXEL;
+}
+
+TEST(rooms_of_separate_walls_hold_air) {
+    shape *s[6];
+    vsh_mesh meshes[6];
+    for (int i = 0; i < 6; ++i) {
+        s[i] = shape_new();
+        shape_box(s[i], LOW, HIGH, 1U << i);
+        meshes[i] = shape_mesh(s[i], "wall");
+    }
+    vsh_grid *grid = grid_of(meshes, 6, with_voxel(VOXEL));
+    assert_true(shell_thickness(grid) > 0.0);
+    assert_is(grid, room_of_sheets, 0.9, 0.1, "six walls");
+    shape_box(s[0], LOW, HIGH, ALL_SIDES & ~LEFT);
+    meshes[0] = shape_mesh(s[0], "box");
+    meshes[0].solidity = VSH_SOLIDITY_SHELL;
+    assert_is(grid_of(meshes, 1, with_voxel(VOXEL)), room_of_sheets, 0.9, 0.1, "a box that is to be a shell");
+    for (int i = 0; i < 6; ++i) {
+        free(s[i]);
+    }
+}
+
+/* --- what is open */
 
 static double sheet(const double p[3]) {
     return fabs(p[2]) - 0.04;
 }
 
 TEST(an_open_quad_becomes_a_shell_with_a_warning) {
-    static const float positions[12] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    const vsh_mesh quad = {
-        .name = "sail", .positions = positions, .indices = indices, .vertex_count = 4, .triangle_count = 2};
-    int warnings = 0;
-    vsh_run run = vsh_run_default();
-    run.warning = keep_warning;
-    run.notes = 1;
-    run.user = &warnings;
-    OWNED(vsh_grid) *grid = NULL;
+    FREED shape *s = shape_new();
+    shape_box(s, LOW, (const double[3]){1, 1, 0}, TOP);
+    const vsh_mesh quad = shape_mesh(s, "sail");
     vsh_grid_options options = with_voxel(0.02);
     options.shell_thickness = 4.0;
-    assert_ok(vsh_grid_from_meshes(&quad, 1, &options, &run, &grid, &failure));
-    assert_int_equal(warnings, 1);
-    assert_non_null(
-        strstr(last_warning, "note: mesh 'sail' (1 of 1): 4 open edges: baked as a shell 4 voxels"));
-    leaves all = leaves_of(grid);
-    assert_float_equal(all.info.shell_thickness, 0.08, 1e-12);
-    for (size_t i = 0; i < all.count; ++i) {
-        for (int v = 0; v < 512; ++v) {
-            double p[3];
-            voxel_position(&all, i, v, p);
-            if (fabs(p[0]) < 0.99 && fabs(p[1]) < 0.99) {
-                const double expected = fmin(sheet(p), 0.06);
-                assert_true(fabs((double)all.leaf[i].values[v] - expected) < 0.01 * 0.02);
-            }
+    OWNED(vsh_grid) *grid = grid_of(&quad, 1, options);
+    assert_warned_once("note: mesh 'sail' (1 of 1): 4 open edges: baked as a shell 4 voxels");
+    assert_near(shell_thickness(grid), 0.08, 1e-12);
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
+    for (size_t n = 0; n < 512 * all.count; ++n) {
+        double p[3];
+        const double value = value_at(&all, n, p);
+        if (fabs(p[0]) < 0.99 && fabs(p[1]) < 0.99) {
+            assert_near(value, fmin(sheet(p), 0.06), 0.01 * 0.02);
         }
     }
-    free(all.leaf);
 }
 
-TEST(a_crack_is_closed_and_told) {
-    model ball = make_sphere(200, 1.0, 0);
-    --ball.mesh.triangle_count;
-    int warnings = 0;
-    vsh_run run = vsh_run_default();
-    run.warning = keep_warning;
-    run.notes = 1;
-    run.user = &warnings;
-    vsh_grid *grid = grid_of(&ball.mesh, 1, 0.03, &run);
-    assert_true(worst_error(grid, unit_sphere, 2.95, 2.95) < 0.1);
-    assert_int_equal(wrong_blocks(grid, unit_sphere, 8), 0);
-    assert_int_equal(warnings, 1);
-    assert_non_null(
-        strstr(last_warning, "note: mesh 'ball' (1 of 1): 3 open edges around 1 hole in 1 of 1 component"));
-    assert_non_null(strstr(last_warning, "closed over the holes"));
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    assert_true(info.shell_thickness == 0.0);
-    vsh_grid_free(grid);
-    free_model(&ball);
+static double capped_ball(const double p[3]) { /* without what is above 0.9 */
+    return fmax(ball(p, 1.0), p[2] - 0.9);
 }
 
-static double two_balls(const double p[3]) {
-    const double q[3] = {p[0] - 0.8, p[1], p[2]};
-    return fmin(unit_sphere(p), unit_sphere(q));
-}
-
-TEST(overlapping_meshes_are_one_solid) {
-    model ball = make_sphere(100, 1.0, 0);
-    static const double aside[12] = {1, 0, 0, 0.8, 0, 1, 0, 0, 0, 0, 1, 0};
-    vsh_mesh both[2] = {ball.mesh, ball.mesh};
-    both[1].transform = aside;
-    vsh_grid *grid = grid_of(both, 2, 0.03, NULL);
-    leaves all = leaves_of(grid);
-    for (size_t i = 0; i < all.count; ++i) {
-        for (int v = 0; v < 512; ++v) {
-            double p[3];
-            voxel_position(&all, i, v, p);
-            const double expected = two_balls(p);
-            /* Along the seam the conversion signs a voxel by the nearer triangle: a groove of half a voxel.
-             */
-            const double q[3] = {p[0] - 0.8, p[1], p[2]};
-            const int seam = fabs(unit_sphere(p)) < 0.03 && fabs(unit_sphere(q)) < 0.03;
-            if (fabs(expected) > (seam ? 0.5 : 0.1) * 0.03) {
-                assert_int_equal(all.leaf[i].values[v] < 0.0f, expected < 0.0);
-            }
-            if (expected > 0.0 && expected < 2.9 * 0.03) {
-                assert_true(fabs((double)all.leaf[i].values[v] - expected) < (seam ? 0.5 : 0.1) * 0.03);
-            }
+TEST(a_solid_with_holes_is_as_deep_as_without_and_told) {
+    FREED shape *s = shape_new();
+    shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 128);
+    s->indices[1500][1] = s->indices[1500][0];
+    for (int i = -1; i < 4; ++i) { /* a hole of one triangle; then another one, of four */
+        if (i >= 0) {
+            s->indices[6000 + i][1] = s->indices[6000 + i][0];
+        }
+        if (i == -1 || i == 3) {
+            vsh_grid *grid = grid_of_shape(s, VOXEL);
+            assert_true(shell_thickness(grid) == 0.0);
+            assert_warned_once(i < 0 ? "3 open edges around 1 hole in 1 of 1 component" : "around 2 holes");
+            assert_warned_once("closed over the holes");
+            assert_is(grid, unit_sphere, 2.9, 0.1, "ball with holes");
         }
     }
-    free(all.leaf);
-    vsh_grid_free(grid);
-    free_model(&ball);
+    s->vertices = s->triangles = 0;
+    shape_ball(s, ORIGIN, 1.0, -1.0, 0.9, 128);
+    OWNED(vsh_grid) *grid = grid_of_shape(s, VOXEL);
+    assert_int_equal(wrong_blocks(grid, capped_ball, 10), 0);
 }
 
-TEST(a_room_in_a_mesh_stays_open_and_keeps_its_furniture) {
-    /* One mesh of three shells: a ball, a room in it that faces inward, and a ball in the room. */
-    model shells[3] = {make_sphere(100, 1.0, 0), make_sphere(100, 0.6, 1), make_sphere(40, 0.2, 0)};
-    for (int turned = 0; turned < 2; ++turned) {
-        size_t vertices = 0, indices = 0;
-        model all = {malloc(50000 * 3 * sizeof(float)), malloc(100000 * 3 * sizeof(uint32_t)), {0}};
-        assert_non_null(all.positions);
-        assert_non_null(all.indices);
-        for (int i = 0; i < 3; ++i) {
-            const vsh_mesh *m = &shells[turned ? 2 - i : i].mesh;
-            memcpy(all.positions + 3 * vertices, m->positions, m->vertex_count * 3 * sizeof(float));
-            for (size_t j = 0; j < 3 * m->triangle_count; ++j) {
-                all.indices[indices++] = m->indices[j] + (uint32_t)vertices;
-            }
-            vertices += m->vertex_count;
-        }
-        const double mirrored[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0};
-        all.mesh = (vsh_mesh){.name = "house",
-                              .positions = all.positions,
-                              .indices = all.indices,
-                              .vertex_count = vertices,
-                              .triangle_count = indices / 3,
-                              .transform = turned ? mirrored : NULL};
-        vsh_grid *grid = grid_of(&all.mesh, 1, 0.03, NULL);
-        assert_true(worst_error(grid, room_with_a_ball, 2.9, 2.9) < 0.1);
-        assert_int_equal(wrong_blocks(grid, room_with_a_ball, 8), 0);
-        vsh_grid_free(grid);
-        free_model(&all);
-    }
-    for (int i = 0; i < 3; ++i) {
-        free_model(&shells[i]);
+static double mixed(const double p[3]) {
+    const double q[3] = {p[0] - 4.0, p[1], p[2]};
+    const double x = fmax(fabs(q[0]) - 1.0, 0.0), y = fmax(fabs(q[1]) - 1.0, 0.0);
+    const double card = sqrt(x * x + y * y + (q[2] - 1.0) * (q[2] - 1.0)) - VOXEL;
+    return fmin(to_box(p, 1.0), card);
+}
+
+TEST(a_card_in_a_solid_s_mesh_leaves_it_solid) {
+    FREED shape *s = shape_new();
+    const double low[3] = {3, -1, -1}, high[3] = {5, 1, 1};
+    shape_box(s, LOW, HIGH, ALL_SIDES);
+    shape_box(s, low, high, TOP);
+    vsh_grid *grid = grid_of_shape(s, VOXEL);
+    assert_true(shell_thickness(grid) > 0.0);
+    assert_is(grid, mixed, 0.9, 0.05, "box and card");
+}
+
+/* --- meshes that nobody should make */
+
+TEST(faces_given_twice_or_one_of_them_change_nothing) {
+    uint32_t twice[72];
+    vsh_mesh mesh = cube();
+    memcpy(twice, mesh.indices, sizeof twice / 2);
+    memcpy(twice + 36, mesh.indices, sizeof twice / 2);
+    mesh.indices = twice;
+    for (mesh.triangle_count = 13; mesh.triangle_count <= 24; mesh.triangle_count += 11) {
+        assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02, "cube given twice");
     }
 }
 
-TEST(threads_do_not_show_in_meshes) {
-    model fine = make_sphere(100, 0.7, 0);
-    model coarse = make_sphere(5, 1.0, 0);
-    const vsh_mesh sets[2][2] = {{fine.mesh, coarse.mesh}, {coarse.mesh, cube}};
-    const int32_t threads[4] = {1, 2, 5, 0};
-    for (int set = 0; set < 2; ++set) {
-        vsh_grid *first = NULL;
-        for (int i = 0; i < 4; ++i) {
-            const vsh_run run = run_on(threads[i]);
-            vsh_grid *grid = grid_of(sets[set], 2, 0.03, &run);
-            if (first == NULL) {
-                first = grid;
-            } else {
-                assert_same_leaves(first, grid, 0.0f);
-                vsh_grid_free(grid);
-            }
-        }
-        vsh_grid_free(first);
+TEST(faces_that_disagree_are_told_and_are_the_same_solid) {
+    uint32_t some_turned[36];
+    vsh_mesh mesh = cube();
+    for (size_t i = 0; i < 36; ++i) {
+        some_turned[i] = mesh.indices[i % 9 == 1 ? i + 1 : i % 9 == 2 ? i - 1 : i];
     }
-    free_model(&fine);
-    free_model(&coarse);
+    mesh.indices = some_turned;
+    assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02, "cube with turned faces");
+    assert_non_null(strstr(warned, "4 triangles that face the other way"));
 }
 
-TEST(bad_meshes_are_refused_with_the_reason) {
+TEST(a_million_triangles_without_area_change_nothing) {
+    FREED uint32_t *indices = calloc(MANY * 3 + 36, sizeof *indices);
+    assert_non_null(indices);
+    vsh_mesh mesh = cube();
+    memcpy(indices, mesh.indices, 36 * sizeof *indices);
+    for (size_t t = 0; t < MANY; ++t) { /* points, and edges there and back */
+        const uint32_t a = (uint32_t)t % 8;
+        memcpy(indices + 36 + 3 * t, (uint32_t[3]){a, a, t % 2 != 0 ? a : (a + 1) % 8}, sizeof(uint32_t[3]));
+    }
+    mesh.indices = indices;
+    mesh.triangle_count += MANY;
+    vsh_mesh_report report;
+    assert_ok(vsh_mesh_check(&mesh, &report, &failure));
+    assert_int_equal(report.degenerate_triangles, MANY);
+    assert_int_equal(report.open_edges, 0);
+    assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02, "cube and degenerate triangles");
+}
+
+/* --- what is refused */
+
+static void assert_refused(vsh_mesh mesh, vsh_grid_options options, uint64_t memory_limit, vsh_result code,
+                           const char *part) {
     vsh_grid *grid = NULL;
-    float positions[24];
-    uint32_t indices[36];
-    vsh_mesh bad = cube;
-    bad.positions = positions;
-    bad.indices = indices;
-    memcpy(positions, cube_positions, sizeof positions);
-    memcpy(indices, cube_indices, sizeof indices);
-    positions[4] = NAN;
-    assert_fails(vsh_grid_from_meshes(&bad, 1, NULL, NULL, &grid, &failure), VSH_ERROR_INPUT, "vertex 1");
-    positions[4] = 0.0f;
-    indices[7] = 8;
-    assert_fails(vsh_grid_from_meshes(&bad, 1, NULL, NULL, &grid, &failure), VSH_ERROR_INPUT, "vertex 8");
-    bad = cube;
-    bad.triangle_count = 0;
-    assert_fails(vsh_grid_from_meshes(&bad, 1, NULL, NULL, &grid, &failure), VSH_ERROR_INPUT,
-                 "without a triangle");
-    assert_fails(vsh_grid_from_meshes(NULL, 0, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT, "no meshes");
-    vsh_grid_options options = with_voxel(1e-9);
-    assert_fails(vsh_grid_from_meshes(&cube, 1, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
-                 "voxel size 1e-09");
-    options = with_voxel(2e-5);
-    assert_fails(vsh_grid_from_meshes(&cube, 1, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT,
-                 "this machine's memory");
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1000000;
-    assert_fails(vsh_grid_from_meshes(&cube, 1, NULL, &run, &grid, &failure), VSH_ERROR_LIMIT,
-                 "limit of 1 MB");
+    const vsh_run run = run_within(memory_limit);
+    assert_fails(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure), code, part);
     assert_null(grid);
 }
 
-TEST(meshes_can_be_cancelled) {
-    model ball = make_sphere(100, 1.0, 0);
-    const double stops[] = {0.0, 0.1, 0.5, 0.9};
-    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
-        watch w = {0.0, stops[i], 0};
-        vsh_run run = run_on(2);
-        run.progress = watch_progress;
-        run.user = &w;
-        vsh_grid *grid = NULL;
-        const vsh_grid_options options = with_voxel(0.04);
-        assert_fails(vsh_grid_from_meshes(&ball.mesh, 1, &options, &run, &grid, &failure),
-                     VSH_ERROR_CANCELLED, "cancelled");
-        assert_null(grid);
-    }
-    free_model(&ball);
+TEST(bad_meshes_are_refused_with_the_reason) {
+    const vsh_grid_options defaults = vsh_grid_options_default();
+    vsh_mesh mesh = cube();
+    assert_refused(mesh, with_voxel(1e-9), 0, VSH_ERROR_LIMIT, "voxel size 1e-09");
+    assert_refused(mesh, with_voxel(2e-5), 0, VSH_ERROR_LIMIT, "this machine's memory");
+    assert_refused(mesh, defaults, 1000000, VSH_ERROR_LIMIT, "limit of 1 MB");
+    mesh.triangle_count = 0;
+    assert_refused(mesh, defaults, 0, VSH_ERROR_INPUT, "without a triangle");
+    vsh_grid *grid = NULL;
+    assert_fails(vsh_grid_from_meshes(NULL, 0, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT, "no meshes");
 }
 
-static int32_t count_down(void *left, const char *stage, double fraction) {
-    (void)stage;
-    (void)fraction;
-    return --*(int32_t *)left < 0;
+TEST(vertices_out_of_the_world_are_refused) {
+    static const struct {
+        float value;
+        vsh_result expected;
+    } cases[] = {{1e30f, VSH_ERROR_LIMIT}, {-1e30f, VSH_ERROR_LIMIT},   {3e38f, VSH_ERROR_LIMIT},
+                 {NAN, VSH_ERROR_INPUT},   {INFINITY, VSH_ERROR_INPUT}, {-INFINITY, VSH_ERROR_INPUT}};
+    const vsh_grid_options resolved = vsh_grid_options_default();
+    float bad[24];
+    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+        for (size_t v = 0; v < 24; v += 7) {
+            vsh_mesh mesh = box_mesh(bad, LOW, HIGH);
+            bad[v] = cases[i].value;
+            char vertex[32];
+            snprintf(vertex, sizeof vertex, "vertex %zu", v / 3);
+            const char *part = cases[i].expected == VSH_ERROR_INPUT ? vertex : "";
+            assert_refused(mesh, with_voxel(0.1), 0, cases[i].expected, part);
+            assert_refused(mesh, resolved, 0, cases[i].expected, part);
+        }
+    }
+    /* and all of it out there: its voxels would be too large */
+    const double far = 1e30;
+    const vsh_mesh mesh = box_mesh(bad, (double[3]){-far, -far, -far}, (double[3]){far, far, far});
+    assert_refused(mesh, resolved, 0, VSH_ERROR_LIMIT, "voxel size");
+}
+
+TEST(indices_out_of_range_are_refused) {
+    static const uint32_t bad[] = {8, 9, 1u << 20, 1u << 31, UINT32_MAX};
+    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+        for (size_t k = 0; k < 36; k += 5) {
+            uint32_t indices[36];
+            vsh_mesh mesh = cube();
+            memcpy(indices, mesh.indices, sizeof indices);
+            indices[k] = bad[i];
+            mesh.indices = indices;
+            assert_refused(mesh, vsh_grid_options_default(), 0, VSH_ERROR_INPUT, "there are only 8");
+        }
+    }
+}
+
+typedef struct countdown {
+    int32_t left;
+    double last;
+} countdown;
+
+static int32_t count_down(void *user, const char *stage, double fraction) {
+    countdown *c = user;
+    assert_string_equal(stage, "voxelize");
+    assert_true(fraction >= c->last && fraction <= 1.0);
+    c->last = fraction;
+    return --c->left < 0;
 }
 
 /* Sorting triangles, filling from outside and cutting where solids overlap all ask. */
 TEST(solids_that_overlap_can_be_cancelled_whenever_progress_is_told) {
-    model ball = make_sphere(100, 1.0, 0);
-    const vsh_mesh meshes[] = {ball.mesh, cube};
+    FREED shape *s = shape_new();
+    shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 200);
+    const vsh_mesh meshes[] = {shape_mesh(s, "ball"), cube()};
     const vsh_grid_options options = with_voxel(0.2);
     enum { LAST = 60 }; /* calls, which are those of this stage */
     int32_t all = INT32_MAX;
     for (int i = 0; i <= LAST; i += i < 2 ? 1 : 5) {
-        int32_t left = i == 0 ? INT32_MAX : all - i;
-        vsh_run run = run_on(1);
-        run.progress = count_down;
-        run.user = &left;
+        countdown c = {.left = i == 0 ? INT32_MAX : all - i};
+        vsh_run run = run_watched(count_down, &c);
+        run.threads = 1;
         OWNED(vsh_grid) *grid = NULL;
         const vsh_result result = vsh_grid_from_meshes(meshes, 2, &options, &run, &grid, &failure);
         if (i == 0) {
-            all -= left;
+            all -= c.left;
             assert_true(all > LAST);
         }
         if (i > 1) { /* the last call says that all is done */
             assert_int_equal(result, VSH_ERROR_CANCELLED);
-            assert_int_equal(left, -1); /* and nobody asks again */
+            assert_int_equal(c.left, -1); /* and nobody asks again */
         }
         assert_true((grid == NULL) == (result == VSH_ERROR_CANCELLED));
     }
-    free_model(&ball);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -2,7 +2,6 @@
 #include "terrain.h"
 #include "testing.h"
 
-#include "base/vec.h"
 #include "heightfield/heights.h"
 
 #include <vdbshade/trace.h>
@@ -16,38 +15,19 @@ typedef struct stage {
     vsh_model *model;
     vsh_mesh mesh;
     truth_mesh *truth;
-    double *positions;
-    float *normals;
+    double positions[3 * POINTS];
+    float normals[3 * POINTS];
 } stage;
 
-/* Points on triangles of the top, which the first are, lifted by a little; their facets' normals. */
-static void put_points(stage *s, double lift) {
+/* Points on triangles of the top, which the first are. */
+static void put_points(stage *s) {
     uint64_t counter = 1;
     const size_t faces = 2 * (size_t)(s->source.columns - 1) * (size_t)(s->source.rows - 1);
     for (size_t i = 0; i < POINTS; ++i) {
         const size_t face = (size_t)between(&counter, 0.0, (double)faces - 0.001);
-        double b = between(&counter, 0.0, 1.0), c = between(&counter, 0.0, 1.0);
-        if (b + c > 1.0) {
-            b = 1.0 - b;
-            c = 1.0 - c;
-        }
-        vshi_vec corner[3];
-        for (int k = 0; k < 3; ++k) {
-            corner[k] = vshi_transform_point(
-                s->mesh.transform,
-                vshi_vec_off(s->mesh.positions + 3 * s->mesh.indices[3 * face + (size_t)k]));
-        }
-        const vshi_vec ab = vshi_sub(corner[1], corner[0]), ac = vshi_sub(corner[2], corner[0]);
-        vshi_vec n = vshi_unit(vshi_cross(ab, ac));
-        if (vshi_transform_determinant(s->mesh.transform) < 0.0) {
-            n = vshi_scale(n, -1.0);
-        }
-        const vshi_vec p = vshi_add(corner[0], vshi_add(vshi_scale(ab, b), vshi_scale(ac, c)));
-        const vshi_vec q = vshi_add(p, vshi_scale(n, lift));
-        const double at[3] = {q.x, q.y, q.z};
-        const float normal[3] = {(float)n.x, (float)n.y, (float)n.z};
-        memcpy(s->positions + 3 * i, at, sizeof at);
-        memcpy(s->normals + 3 * i, normal, sizeof normal);
+        const double b = uniform(&counter), c = uniform(&counter);
+        const bool over = b + c > 1.0;
+        stand_on(&s->mesh, face, over ? 1.0 - b : b, over ? 1.0 - c : c, i, s->positions, s->normals);
     }
 }
 
@@ -59,17 +39,11 @@ static stage set_up(int columns, int rows, double height, const double *transfor
     s.model = model_of(&s.source, VSH_HEIGHTS_SOLID);
     s.mesh = vsh_model_mesh(s.model, 0, -1);
     s.truth = truth_mesh_create(&s.mesh, 1);
-    s.positions = malloc(POINTS * 3 * sizeof *s.positions);
-    s.normals = malloc(POINTS * 3 * sizeof *s.normals);
-    assert_non_null(s.positions);
-    assert_non_null(s.normals);
-    put_points(&s, 1e-4);
+    put_points(&s);
     return s;
 }
 
 static void tear_down(stage *s) {
-    free(s->normals);
-    free(s->positions);
     truth_mesh_free(s->truth);
     vsh_model_free(s->model);
     vsh_heights_free(s->heights);
@@ -89,7 +63,7 @@ TEST(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step) {
     static const double directions[][3] = {
         {-0.9, 0.2, 0.35}, {0.3, 0.6, -0.7}, {0.05, 1.0, 0.02}, {-0.9, -0.05, 0.35}};
     for (int turned = 0; turned < 2; ++turned) {
-        stage s = set_up(SIDE, SIDE, 2.0, turned ? transform : NULL);
+        FREED_BY(tear_down) stage s = set_up(SIDE, SIDE, 2.0, turned ? transform : NULL);
         for (size_t d = 0; d < sizeof directions / sizeof directions[0]; ++d) {
             const vsh_light light = sun(directions[d], RADIANS(3.0));
             static float values[POINTS], truth[POINTS];
@@ -99,10 +73,8 @@ TEST(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step) {
             for (size_t i = 0; i < POINTS; ++i) {
                 differ += values[i] != truth[i];
             }
-            print_message("direction %zu: %zu of %d differ\n", d, differ, POINTS);
-            assert_true(differ <= POINTS / 50);
+            assert_at_most(differ, POINTS / 50);
         }
-        tear_down(&s);
     }
 }
 
@@ -115,7 +87,7 @@ TEST(a_classic_march_is_the_least_height_over_the_cone_s_width) {
     }
     const vsh_heights_source source = {
         .columns = 65, .rows = 9, .values = plateau, .size = {64, 8}, .height = 4, .base = 1};
-    vsh_heights *heights = heights_of(&source);
+    OWNED(vsh_heights) *heights = heights_of(&source);
     static const double towards[3] = {1.0, 0.5, 0.0};
     const double w = 0.2;
     const vsh_light light = sun(towards, 2.0 * atan(w));
@@ -133,11 +105,10 @@ TEST(a_classic_march_is_the_least_height_over_the_cone_s_width) {
         }
         assert_float_equal(value[0], expected, 0.1); /* it steps over the edge */
     }
-    vsh_heights_free(heights);
 }
 
 TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
-    stage s = set_up(SIDE, SIDE, 2.0, NULL);
+    FREED_BY(tear_down) stage s = set_up(SIDE, SIDE, 2.0, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, -0.3, 0, 0, 5, 0};
     const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
     static const double up[3] = {0, 1, 0};
@@ -152,9 +123,4 @@ TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
         assert_true(values[2 - begin] == 0.0f);
         assert_true(begin == 0 ? isnan(values[0]) : values[2] == 1.0f);
     }
-    tear_down(&s);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -1,63 +1,6 @@
-/* What is hidden where surfaces touch: vsh_lightmap_fill_hidden(), and the tree that it asks. */
+/* Charts hidden where surfaces touch: vsh_lightmap_fill_hidden(). */
 #include "seams.h"
 #include "testing.h"
-
-#include "bake/places.h"
-
-/* --- the tree */
-
-static uint32_t nearest_of_all(const vshi_place *list, size_t count, const float at[3], float most) {
-    uint32_t best = UINT32_MAX;
-    for (size_t i = 0; i < count; ++i) {
-        float square = 0;
-        for (int k = 0; k < 3; ++k) {
-            square += (list[i].at[k] - at[k]) * (list[i].at[k] - at[k]);
-        }
-        if (square < most || (square == most && best != UINT32_MAX && list[i].number < best)) {
-            most = square;
-            best = list[i].number;
-        }
-    }
-    return best;
-}
-
-/* Places anywhere, on a plane, on a coarse lattice (many at one place), and all at one. */
-TEST(the_tree_finds_what_a_look_at_all_finds) {
-    enum { MOST = 1500 };
-    uint32_t seed = 5;
-    for (int kind = 0; kind < 4; ++kind) {
-        for (size_t count = 1; count <= MOST; count = count < 20 ? count + 1 : 5 * count) {
-            vshi_places places = {calloc(count, sizeof(vshi_place)), NULL, count};
-            vshi_place *list = calloc(count, sizeof *list);
-            for (size_t i = 0; i < count; ++i) {
-                for (int k = 0; k < 3; ++k) {
-                    const float x = random_value(&seed);
-                    list[i].at[k] = kind == 3             ? 1.0F
-                                    : kind == 2           ? floorf(5 * x)
-                                    : kind == 1 && k == 2 ? 0.0F
-                                                          : x;
-                }
-                list[i].number = (uint32_t)(count - i); /* not in the order of the list */
-            }
-            memcpy(places.list, list, count * sizeof *list);
-            assert_int_equal(vshi_places_sort(&places, NULL), VSH_OK);
-            for (int i = 0; i < 200; ++i) {
-                float at[3];
-                for (int k = 0; k < 3; ++k) {
-                    at[k] =
-                        kind == 2 ? floorf(11 * random_value(&seed)) / 2 : 1.4F * random_value(&seed) - 0.2F;
-                }
-                const float most = i % 2 ? INFINITY : 0.02F;
-                assert_int_equal(vshi_places_nearest(&places, at, most),
-                                 nearest_of_all(list, count, at, most));
-            }
-            vshi_places_free(&places);
-            free(list);
-        }
-    }
-}
-
-/* --- lightmaps */
 
 /* Three squares of the plane z = 0 in a row, each a chart of 12 texels: the middle one is hidden. Beside the
  * first, in the lightmap, stands a fourth that is far away in the world. */
@@ -144,7 +87,7 @@ static void assert_value(const stage *s, size_t texel, float expected) {
 }
 
 TEST(a_hidden_chart_takes_the_nearest_values_of_the_world) {
-    stage s = begin(2, false);
+    FREED_BY(end) stage s = begin(2, false);
     assert_int_equal(fill(&s, 1), CHART_TEXELS * CHART_TEXELS);
     for (size_t i = 0; i < TEXELS; ++i) {
         int column, row;
@@ -160,12 +103,11 @@ TEST(a_hidden_chart_takes_the_nearest_values_of_the_world) {
             assert_true(s.coverage[i] == (chart != HIDDEN_CHART));
         }
     }
-    end(&s);
 }
 
 TEST(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest) {
     for (int32_t padding = 0; padding <= 6; padding += 2) {
-        stage s = begin(padding, false);
+        FREED_BY(end) stage s = begin(padding, false);
         fill(&s, 1);
         const int reach = padding < 4 ? padding : 4, x = 24, y = 8; /* the chart's first texel */
         for (int d = 1; d <= 6; ++d) {
@@ -182,12 +124,11 @@ TEST(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest) {
                              d < 2 && d < reach ? value_of(SEEN, CHART_TEXELS - 1, CHART_TEXELS - 1) : -1.0F);
             }
         }
-        end(&s);
     }
 }
 
 TEST(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen) {
-    stage s = begin(2, true);
+    FREED_BY(end) stage s = begin(2, true);
     int column, row;
     for (size_t i = 0; i < TEXELS; ++i) { /* as the bake fills them */
         if (chart_at(i, &column, &row) == HIDDEN_CHART && column >= 3) {
@@ -203,7 +144,6 @@ TEST(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen) {
             assert_value(&s, i, across ? value_of(ACROSS, 0, row) : value_of(HIDDEN_CHART, 2, row));
         }
     }
-    end(&s);
 }
 
 /* The square that is across lies over the hidden one from its fifth column on. */
@@ -213,7 +153,7 @@ TEST(what_lookups_beside_the_seen_read_is_its_own) {
     for (int c = 0; c < CHARTS; ++c) {
         add_square(m, places[c], corners[c], CHART_TEXELS, 0.0, 1.0);
     }
-    stage s = begin_with(m, 2, true);
+    FREED_BY(end) stage s = begin_with(m, 2, true);
     const int row = 5;
     const size_t first = (size_t)(8 + row) * SIDE + 24;
     for (size_t column = 3; column < CHART_TEXELS; ++column) {
@@ -224,19 +164,16 @@ TEST(what_lookups_beside_the_seen_read_is_its_own) {
         assert_value(&s, first + column,
                      column == 5 ? value_of(ACROSS, 0, row) : value_of(HIDDEN_CHART, 2, row));
     }
-    end(&s);
 }
 
 TEST(nothing_changes_where_all_is_seen_or_nothing) {
     for (int seen = 0; seen < 2; ++seen) {
-        stage s = begin(2, false), before = begin(2, false);
+        FREED_BY(end) stage s = begin(2, false), before = begin(2, false);
         for (size_t i = 0; i < TEXELS; ++i) {
             s.coverage[i] = (float)seen;
         }
         assert_int_equal(fill(&s, 1), 0);
         assert_memory_equal(s.ao, before.ao, TEXELS * sizeof *s.ao);
-        end(&before);
-        end(&s);
     }
 }
 
@@ -245,7 +182,7 @@ static int32_t stop(void *user, const char *step, double fraction) {
 }
 
 TEST(threads_change_nothing_nor_do_calls_that_fail) {
-    stage s = begin(2, false), other = begin(2, false);
+    FREED_BY(end) stage s = begin(2, false), other = begin(2, false);
     fill(&s, 1);
     const vsh_lightmap map = {.ao = other.ao, .coverage = other.coverage}, none = {.ao = other.ao};
     vsh_run limited = vsh_run_default(), stopped = vsh_run_default();
@@ -262,10 +199,4 @@ TEST(threads_change_nothing_nor_do_calls_that_fail) {
                  "");
     fill(&other, 4);
     assert_memory_equal(s.ao, other.ao, TEXELS * sizeof *s.ao);
-    end(&other);
-    end(&s);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

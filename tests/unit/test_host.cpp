@@ -12,7 +12,6 @@
 #include "base/hash.h"
 #include "extern/tsan.h"
 
-#include <cfenv>
 #include <sys/stat.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -33,6 +32,8 @@ void *rtcNewDevice(const char *) {
 }
 
 namespace {
+
+OWNER(vsh_provenance)
 
 std::string folder;
 
@@ -65,13 +66,12 @@ void write_text(const char *name, const char *text) {
 // Everything that reads numbers, computes with them or writes them.
 Outcome work(int32_t threads = 0) {
     Outcome o;
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
-    vsh_scene *scene = nullptr;
-    vsh_assets *assets = nullptr;
-    vsh_grid *grid = nullptr;
-    vsh_occluders *occluders = nullptr;
-    vsh_provenance *provenance = nullptr;
+    vsh_run run = run_on(threads);
+    OWNED(vsh_scene) *scene = nullptr;
+    OWNED(vsh_assets) *assets = nullptr;
+    OWNED(vsh_grid) *grid = nullptr;
+    OWNED(vsh_occluders) *occluders = nullptr;
+    OWNED(vsh_provenance) *provenance = nullptr;
     vsh_error error{};
     const std::string path = folder + "/scene.json";
     if (o.check(vsh_scene_read(path.c_str(), nullptr, &scene, &error), error) &&
@@ -110,11 +110,6 @@ Outcome work(int32_t threads = 0) {
             o.add(list[i].value, std::strlen(list[i].value));
         }
     }
-    vsh_provenance_free(provenance);
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
     return o;
 }
 
@@ -135,32 +130,23 @@ Outcome plain() {
     return o;
 }
 
-TEST(rounding_of_the_host_changes_nothing_and_is_given_back) {
-    const Outcome expected = plain();
-    for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
-        assert_int_equal(std::fesetround(mode), 0);
-        const Outcome there = work();
-        const int kept = std::fegetround();
-        std::fesetround(FE_TONEAREST);
-        assert_int_equal(kept, mode);
-        expect_same(expected, there, "rounding");
-    }
-}
-
-TEST(flushing_to_zero_changes_nothing_and_is_given_back) {
-#if defined(__x86_64__)
-    constexpr vshi_floats FLUSH = 0x8040; // FTZ and DAZ
+// test_environment has every setting, of calls that read no file.
+TEST(rounding_and_flushing_to_zero_change_nothing_and_are_given_back) {
     const Outcome expected = plain();
     const vshi_floats host = vshi_floats_get();
-    vshi_floats_set(host | FLUSH);
-    const Outcome there = work();
-    const vshi_floats kept = vshi_floats_get();
-    vshi_floats_set(host);
-    assert_int_equal(kept & FLUSH, FLUSH);
-    expect_same(expected, there, "flush to zero");
+#if defined(__x86_64__)
+    constexpr vshi_floats SETTINGS[] = {0x8040, 0x2000, 0x4000, 0x6000}; // FTZ and DAZ; down, up, to zero
 #else
-    skip();
+    constexpr vshi_floats SETTINGS[] = {1u << 24, 1u << 22, 2u << 22, 3u << 22};
 #endif
+    for (const vshi_floats setting : SETTINGS) {
+        vshi_floats_set(host | setting);
+        const Outcome there = work();
+        const vshi_floats kept = vshi_floats_get();
+        vshi_floats_set(host);
+        assert_int_equal(kept & setting, setting);
+        expect_same(expected, there, "a setting of floats");
+    }
 }
 
 TEST(a_decimal_comma_changes_nothing_and_is_given_back) {
@@ -239,8 +225,8 @@ TEST(many_threads_share_one_field) {
     const vsh_sdf sdf = {&node, 1};
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.voxel_size = 0.0625;
-    vsh_grid *grid = nullptr;
-    vsh_occluders *occluders = nullptr;
+    OWNED(vsh_grid) *grid = nullptr;
+    OWNED(vsh_occluders) *occluders = nullptr;
     vsh_error error{};
     assert_int_equal(vsh_grid_from_sdf(&sdf, &grid_options, nullptr, &grid, &error), VSH_OK);
     assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &error), VSH_OK);
@@ -248,25 +234,20 @@ TEST(many_threads_share_one_field) {
     const auto bake = [&](int32_t threads) {
         Outcome o;
         vsh_error why{};
-        vsh_run run = vsh_run_default();
-        run.threads = threads;
-        vsh_voxels *voxels = nullptr;
-        vsh_volume *volume = nullptr;
+        vsh_run run = run_on(threads);
+        OWNED(vsh_voxels) *voxels = nullptr;
+        OWNED(vsh_volume) *volume = nullptr;
         o.check(vsh_voxels_from_grid(grid, 2.0, &run, &voxels, &why), why);
         o.check(vsh_bake_volume(occluders, voxels, &light, 1, nullptr, &run, &volume, nullptr, &why), why);
         std::vector<float> values(40 * 40 * 40);
         const int32_t low[3] = {-20, -20, -20}, size[3] = {40, 40, 40};
         o.check(vsh_volume_copy(volume, 0, low, size, values.data(), &why), why);
         o.add(values.data(), values.size());
-        vsh_volume_free(volume);
-        vsh_voxels_free(voxels);
         return o;
     };
     const Outcome expected = bake(1);
     assert_true(expected.failure.empty());
     expect_same_on_threads(expected, 12, [&](size_t i) { return bake(int32_t(i % 4)); });
-    vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
 }
 
 TEST(embree_of_the_host_is_not_called) {
@@ -277,13 +258,12 @@ TEST(embree_of_the_host_is_not_called) {
     mesh.indices = indices;
     mesh.vertex_count = 3;
     mesh.triangle_count = 1;
-    vsh_triangles *triangles = nullptr;
+    OWNED(vsh_triangles) *triangles = nullptr;
     vsh_error error{};
     const vsh_result result = vsh_triangles_create(&mesh, 1, nullptr, &triangles, &error);
     assert_string_equal(error.message, "");
     assert_int_equal(result, VSH_OK);
     assert_false(host_called);
-    vsh_triangles_free(triangles);
 }
 
 int make_folder(void **) {
@@ -317,6 +297,4 @@ int remove_folder(void **) {
 
 } // namespace
 
-int main() {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -19,7 +19,7 @@ static void refused(const char *path, const vsh_image *image, int32_t bits, cons
 }
 
 TEST(bad_packs_are_refused_by_part) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     static const char *const cases[][2] = {
         {"R=shadow.moon", "shadow.moon"},
@@ -43,7 +43,6 @@ TEST(bad_packs_are_refused_by_part) {
     }
 
     assert_int_equal(access(at("pack.png"), F_OK), -1);
-    unmake(&s);
 }
 
 TEST(what_a_format_lacks_is_refused) {
@@ -76,7 +75,7 @@ TEST(what_a_format_lacks_is_refused) {
         {"x.FITS", 0, NULL, "is not written: "},
         {"x.j2c", 0, NULL, "is not written: "},
     };
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         refused(at(cases[i].name), &s.image, cases[i].bits, cases[i].pack, VSH_ERROR_ARGUMENT, cases[i].part);
@@ -85,11 +84,10 @@ TEST(what_a_format_lacks_is_refused) {
     s.image.width = 70000;
     s.image.height = 1;
     refused(at("x.jpg"), &s.image, 0, NULL, VSH_ERROR_ARGUMENT, "65500");
-    unmake(&s);
 }
 
 TEST(bad_images_are_refused) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     vsh_image bad = s.image;
     bad.width = 0;
@@ -120,11 +118,10 @@ TEST(bad_images_are_refused) {
     assert_fails(vsh_image_write(at("x.exr"), &s.image, NULL, &failure), VSH_ERROR_ARGUMENT, "'ao'");
     s.image.planes = NULL; /* enough for a check before the bake */
     assert_ok(vsh_image_check(at("x.exr"), &s.image, NULL, &failure));
-    unmake(&s);
 }
 
 TEST(places_that_cannot_be_written_are_refused) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
     assert_int_equal(mkdir(at("folder.exr"), 0777), 0);
     assert_int_equal(mkfifo(at("fifo.png"), 0666), 0);
@@ -133,13 +130,12 @@ TEST(places_that_cannot_be_written_are_refused) {
     refused(at("fifo.png"), &s.image, 0, NULL, VSH_ERROR_WRITE, "regular");
     assert_int_equal(rmdir(at("folder.exr")), 0);
     assert_int_equal(unlink(at("fifo.png")), 0);
-    unmake(&s);
 }
 
 TEST(cut_files_are_errors) {
     static const char *const names[] = {"c.exr", "c.png", "c.tif", "c.tga",
                                         "c.bmp", "c.hdr", "c.ppm", "c.dpx"};
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         const char *path = at(names[n]);
@@ -169,12 +165,11 @@ TEST(cut_files_are_errors) {
         assert_true(errors > 0);
         free(bytes);
     }
-    unmake(&s);
 }
 
 TEST(damaged_files_do_no_harm) {
     static const char *const names[] = {"b.exr", "b.png", "b.tif", "b.jpg", "b.tga", "b.bmp"};
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     uint32_t seed = 1;
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
@@ -191,14 +186,12 @@ TEST(damaged_files_do_no_harm) {
             bytes[place] = (unsigned char)(seed >> 24);
             write_all(path, bytes, size);
             bytes[place] = old;
-            vsh_image_file *file = NULL;
+            OWNED(vsh_image_file) *file = NULL;
             const vsh_result result = vsh_image_read(path, NULL, &file, &failure);
             assert_true((result == VSH_OK) == (file != NULL));
-            vsh_image_free(file);
         }
         free(bytes);
     }
-    unmake(&s);
 }
 
 TEST(unreadable_paths_are_read_errors) {
@@ -225,7 +218,7 @@ TEST(unreadable_paths_are_read_errors) {
 
 TEST(the_memory_limit_holds_without_a_reader) {
     static const char *const names[] = {"m.exr", "m.png", "m.tif"};
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 33, 40, 3, LIGHTMAP);
     for (size_t n = 0; n < sizeof names / sizeof names[0]; ++n) {
         assert_ok(vsh_image_write(at(names[n]), &s.image, NULL, &failure));
@@ -242,11 +235,10 @@ TEST(the_memory_limit_holds_without_a_reader) {
         assert_null(file);
         assert_non_null(strstr(failure.message, names[n]));
     }
-    unmake(&s);
 }
 
 TEST(a_written_file_follows_links_and_keeps_its_mode) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 3, 3, 3, LIGHTMAP);
     const char *target = at("target.exr");
     const char *link = at("link.exr");
@@ -260,7 +252,6 @@ TEST(a_written_file_follows_links_and_keeps_its_mode) {
     assert_int_equal(stat(target, &status), 0);
     assert_int_equal(status.st_mode & 0777, 0640);
     assert_true(status.st_size > 3);
-    unmake(&s);
 }
 
 TEST(outputs_are_made_beside_the_target_and_keep_its_ending) {
@@ -320,17 +311,6 @@ static void expect_text(const char *name, const char *text) {
     assert_string_equal(found, text);
 }
 
-static size_t entries(void) {
-    DIR *directory = opendir(folder);
-    assert_non_null(directory);
-    size_t count = 0;
-    while (readdir(directory) != NULL) {
-        ++count;
-    }
-    closedir(directory);
-    return count;
-}
-
 static void begin(vshi_output *outputs, vshi_output **list) {
     for (size_t i = 0; i < COUNT; ++i) {
         assert_ok(vshi_output_begin(&outputs[i], at(together[i]), &failure));
@@ -341,14 +321,14 @@ static void begin(vshi_output *outputs, vshi_output **list) {
 
 TEST(all_are_in_place_in_the_end) {
     vshi_output outputs[COUNT], *list[COUNT];
-    const size_t before = entries();
+    const int before = entries_in_folder();
     put_text(at(together[1]), "old");
     begin(outputs, list);
     assert_ok(vshi_outputs_commit(list, COUNT, &failure));
     for (size_t i = 0; i < COUNT; ++i) {
         expect_text(together[i], "new");
     }
-    assert_int_equal(entries(), before + COUNT);
+    assert_int_equal(entries_in_folder(), before + COUNT);
     for (size_t i = 0; i < COUNT; ++i) {
         unlink(at(together[i]));
     }
@@ -356,7 +336,7 @@ TEST(all_are_in_place_in_the_end) {
 
 /* A folder that came into the way of each in turn, as nothing but a file can be replaced. */
 TEST(one_that_fails_leaves_all_as_they_were) {
-    const size_t before = entries();
+    const int before = entries_in_folder();
     for (size_t failing = 0; failing < COUNT; ++failing) {
         vshi_output outputs[COUNT], *list[COUNT];
         put_text(at(together[1]), "old");
@@ -373,10 +353,8 @@ TEST(one_that_fails_leaves_all_as_they_were) {
             expect_text(together[i], i == 1 && failing != 1 ? "old" : NULL);
         }
         unlink(at(together[1]));
-        assert_int_equal(entries(), before);
+        assert_int_equal(entries_in_folder(), before);
     }
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

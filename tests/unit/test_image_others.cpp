@@ -363,7 +363,3 @@ TEST(the_longest_row_is_written) {
 }
 
 } // namespace
-
-int main() {
-    return run_all_tests(nullptr, nullptr);
-}

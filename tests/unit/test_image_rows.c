@@ -56,7 +56,7 @@ static void assert_same_file(const char *path, const char *other) {
 
 /* Neither the time nor the file's name: and no path so long that a header had no room for its end. */
 TEST(the_same_image_is_the_same_bytes_later_elsewhere) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 64, 50, 3, LIGHTMAP);
     const int back = open(".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     assert_true(back >= 0 && chdir(at("")) == 0);
@@ -74,7 +74,6 @@ TEST(the_same_image_is_the_same_bytes_later_elsewhere) {
     }
     assert_int_equal(fchdir(back), 0);
     close(back);
-    unmake(&s);
 }
 
 /* Pieces of the last size are wide enough that OpenImageIO is handed several lots of rows. */
@@ -84,7 +83,7 @@ TEST(rows_make_the_bytes_of_the_whole_image) {
         size_t endings;
     } cases[] = {{200, 150, 0, ENDING_COUNT}, {200, 150, 64, ENDING_COUNT}, {8192, 100, 24, LONG_COUNT}};
     for (size_t k = 0; k < 3; ++k) {
-        sample s;
+        FREED_BY(unmake) sample s;
         make(&s, cases[k].width, cases[k].height, k == 2 ? 4 : 3,
              (const char *const[]){"shadow.sun", "ao", "A", "shadow.lamp"});
         for (size_t e = 0; e < cases[k].endings; ++e) {
@@ -97,19 +96,7 @@ TEST(rows_make_the_bytes_of_the_whole_image) {
             unlink(at(whole));
             unlink(at(pieces));
         }
-        unmake(&s);
     }
-}
-
-static int entries_in_folder(void) {
-    DIR *directory = opendir(folder);
-    assert_non_null(directory);
-    int count = 0;
-    while (readdir(directory) != NULL) {
-        ++count;
-    }
-    closedir(directory);
-    return count;
 }
 
 static const unsigned char old_content[] = "the old content";
@@ -123,7 +110,7 @@ static void assert_untouched(const char *path, int entries) {
 }
 
 TEST(what_is_given_up_or_short_of_rows_leaves_the_old_file) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 200, 150, 3, LIGHTMAP);
     for (size_t e = 0; e < ENDING_COUNT; ++e) {
         char name[16];
@@ -142,11 +129,10 @@ TEST(what_is_given_up_or_short_of_rows_leaves_the_old_file) {
         assert_fails(vsh_image_writer_finish(writer, &failure), VSH_ERROR_ARGUMENT, "149 of 150");
         assert_untouched(at(name), entries);
     }
-    unmake(&s);
 }
 
 TEST(rows_that_are_none_of_it_are_refused) {
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 20, 10, 3, LIGHTMAP);
     vsh_image_writer *writer = begin(at("refused.exr"), &s);
     assert_fails(vsh_image_writer_add(writer, 0, s.planes, &failure), VSH_ERROR_ARGUMENT, "");
@@ -159,7 +145,6 @@ TEST(rows_that_are_none_of_it_are_refused) {
     assert_fails(vsh_image_writer_finish(NULL, &failure), VSH_ERROR_ARGUMENT, "writer is NULL");
     assert_fails(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(writer);
-    unmake(&s);
 }
 
 /* The limit on a file's size stands for a full disk: at the first byte, in the middle, at the very last one.
@@ -168,7 +153,7 @@ TEST(a_full_disk_leaves_the_old_file_and_nothing_else) {
     signal(SIGXFSZ, SIG_IGN);
     struct rlimit old_limit;
     assert_int_equal(getrlimit(RLIMIT_FSIZE, &old_limit), 0);
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, 200, 180, 3, LIGHTMAP);
     for (size_t e = 0; e < ENDING_COUNT; ++e) {
         char name[16];
@@ -195,7 +180,6 @@ TEST(a_full_disk_leaves_the_old_file_and_nothing_else) {
         }
     }
     signal(SIGXFSZ, SIG_DFL);
-    unmake(&s);
 }
 
 /* --- EXR files in tiles, which this library reads and does not write: they are made by OpenEXR's own calls
@@ -273,10 +257,10 @@ TEST(the_finest_level_is_read_to_the_bit) {
     };
     for (size_t i = 0; i < sizeof tilings / sizeof tilings[0]; ++i) {
         const tiling *t = &tilings[i];
-        sample s;
+        FREED_BY(unmake) sample s;
         make(&s, t->width, t->height, CHANNELS, NAMES);
         write_tiles(at("tiles.exr"), t, &s);
-        vsh_image_file *file = NULL;
+        OWNED(vsh_image_file) *file = NULL;
         assert_ok(vsh_image_read(at("tiles.exr"), NULL, &file, &failure));
         const vsh_image view = vsh_image_view(file);
         assert_int_equal(view.width, t->width);
@@ -287,8 +271,6 @@ TEST(the_finest_level_is_read_to_the_bit) {
             assert_memory_equal(view.planes[c], s.planes[c],
                                 (size_t)t->width * (size_t)t->height * sizeof(float));
         }
-        vsh_image_free(file);
-        unmake(&s);
     }
 }
 
@@ -299,7 +281,7 @@ static int32_t stop_at_half(void *user, const char *stage, double fraction) {
 
 TEST(reading_can_be_cancelled_between_rows_of_tiles) {
     const tiling t = {40, 64, 16, 16, 0, 0, EXR_TILE_ONE_LEVEL};
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);
     write_tiles(at("cancelled.exr"), &t, &s);
     vsh_run run = vsh_run_default();
@@ -307,12 +289,11 @@ TEST(reading_can_be_cancelled_between_rows_of_tiles) {
     vsh_image_file *file = NULL;
     assert_fails(vsh_image_read(at("cancelled.exr"), &run, &file, &failure), VSH_ERROR_CANCELLED, "");
     assert_null(file);
-    unmake(&s);
 }
 
 TEST(cut_files_are_refused) {
     const tiling t = {37, 23, 16, 8, 0, 0, EXR_TILE_ONE_LEVEL};
-    sample s;
+    FREED_BY(unmake) sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);
     write_tiles(at("whole.exr"), &t, &s);
     unsigned char *bytes = NULL;
@@ -327,9 +308,6 @@ TEST(cut_files_are_refused) {
         assert_null(file);
     }
     free(bytes);
-    unmake(&s);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

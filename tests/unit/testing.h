@@ -1,6 +1,6 @@
 /* Every test includes this: the C library, the public headers, and checks of results and numbers. Tests list
- * themselves, and variables free their memory. A test is TEST(claim) { … }; main() returns
- * run_all_tests(). */
+ * themselves, and variables free their memory. A test is TEST(claim) { … }. main.c runs the tests of a
+ * program; a main() of its own returns run_all_tests(). */
 #ifndef TESTS_TESTING_H
 #define TESTS_TESTING_H
 
@@ -18,10 +18,13 @@
 
 #ifdef __cplusplus
 extern "C" {
+#endif
 #include <cmocka.h>
+
+/* Runs what the program lists; main.c calls it. */
+__attribute__((weak)) int run_listed_tests(void);
+#ifdef __cplusplus
 }
-#else
-#include <cmocka.h>
 #endif
 
 #include <vdbshade/vdbshade.h>
@@ -53,6 +56,19 @@ static inline void list_test(const char *claim, CMUnitTestFunction test, int lin
 
 static inline int run_all_tests(CMFixtureFunction begin, CMFixtureFunction end) {
     return _cmocka_run_group_tests("tests", listed_tests, listed_count, begin, end);
+}
+
+static CMFixtureFunction listed_begin, listed_end;
+
+/* Calls `begin` before the first test and `end` after the last one. */
+#define FIXTURE(begin, end)                                                                                  \
+    __attribute__((constructor)) static void list_fixture(void) {                                            \
+        listed_begin = begin;                                                                                \
+        listed_end = end;                                                                                    \
+    }
+
+int run_listed_tests(void) {
+    return run_all_tests(listed_begin, listed_end);
 }
 
 /* --- checks */
@@ -136,21 +152,30 @@ static inline void free_memory(void *pointer) {
         type##_free(*object);                                                                                \
     }
 
+OWNER(vsh_assets)
 OWNER(vsh_atlas)
 OWNER(vsh_charts)
+OWNER(vsh_comparison)
 OWNER(vsh_field)
+OWNER(vsh_flat_scene)
 OWNER(vsh_grid)
 OWNER(vsh_heights)
 OWNER(vsh_model)
 OWNER(vsh_occluders)
+OWNER(vsh_outline)
 OWNER(vsh_query)
 OWNER(vsh_scene)
 OWNER(vsh_solids)
 OWNER(vsh_spheres)
 OWNER(vsh_texels)
+OWNER(vsh_tolerances)
 OWNER(vsh_triangles)
 OWNER(vsh_volume)
 OWNER(vsh_voxels)
+
+static inline void vsh_image_file_release(vsh_image_file **file) {
+    vsh_image_free(*file);
+}
 
 /* --- meshes and grids */
 
