@@ -53,8 +53,7 @@ static inline vsh_measures measure(const plane *golden, const plane *values, con
 static inline vsh_measures measure_as(int32_t width, int32_t height, int32_t depth, plane_fn *fn,
                                       const void *golden, const void *values) {
     FREED_BY(free_plane)
-    plane a = make_plane(width, height, depth, fn, golden),
-          b = make_plane(width, height, depth, fn, values);
+    plane a = make_plane(width, height, depth, fn, golden), b = make_plane(width, height, depth, fn, values);
     const vsh_measures m = measure(&a, &b, NULL);
     return m;
 }

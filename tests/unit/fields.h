@@ -2,17 +2,9 @@
 #ifndef TESTS_FIELDS_H
 #define TESTS_FIELDS_H
 
+#include "testing.h"
+
 #include "truth/analytic.h"
-
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include <string.h>
 
 #include <vdbshade/field.h>
 
@@ -52,10 +44,7 @@ static inline vsh_grid *grid_of_moved(truth_scene scene, double voxel, double sc
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = scale * voxel;
     vsh_grid *grid = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     return grid;
 }
 
@@ -69,10 +58,7 @@ static inline vsh_field *field_of_grid(vsh_grid *grid, double reach) {
     vsh_field_options options = vsh_field_options_default();
     options.reach = reach;
     vsh_field *field = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_field_create(grid, &options, NULL, &field, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_field_create(grid, &options, NULL, &field, &failure));
     vsh_grid_free(grid);
     return field;
 }

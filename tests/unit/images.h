@@ -2,27 +2,15 @@
 #ifndef TESTS_IMAGES_H
 #define TESTS_IMAGES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/image.h>
+#include "testing.h"
 
 #include "base/file.h"
 #include "image/planes.h"
 
 #include <dirent.h>
-#include <math.h>
 #include <signal.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 static char folder[256];
 
@@ -87,7 +75,6 @@ static inline void write_all(const char *path, const unsigned char *bytes, size_
 }
 
 static inline int make_folder(void **state) {
-    (void)state;
     char here[200];
     const char *place = getenv("TMPDIR");
     if (place == NULL) { /* where the tests were built */
@@ -98,7 +85,6 @@ static inline int make_folder(void **state) {
 }
 
 static inline int remove_folder(void **state) {
-    (void)state;
     if (getenv("VSH_KEEP") != NULL) {
         return 0;
     }

@@ -78,12 +78,9 @@ static inline vsh_render_options small(vsh_camera camera, int32_t samples) {
 
 static inline void render(const vsh_surface *surfaces, size_t count, const vsh_field *field,
                           const vsh_light *light, const vsh_render_options *options, const vsh_run *run) {
-    vsh_error error = {VSH_OK, ""};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    if (vsh_render(surfaces, count, occluders_of(field), light, light != NULL, options, run, &picture, &stats,
-                   &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_render(surfaces, count, occluders_of(field), light, light != NULL, options, run, &picture,
+                         &stats, &failure));
     assert_int_equal(stats.unfinished, 0);
 }
 

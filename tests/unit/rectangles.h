@@ -115,11 +115,7 @@ static inline vsh_shade_options options_of(int32_t method) {
 static inline void shade_by(const vsh_occluders *occluders, const vsh_light *light,
                             const vsh_shade_options *options, float *values, float *deviation) {
     const vsh_points points = {COUNT, positions, normals, NULL};
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(occluders, &points, light, options, NULL, values, deviation, NULL, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_shade_shadow(occluders, &points, light, options, NULL, values, deviation, NULL, &failure));
 }
 
 static inline void shade(const casting *c, const vsh_light *light, const vsh_shade_options *options,

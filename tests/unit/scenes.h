@@ -2,27 +2,13 @@
 #ifndef TESTS_SCENES_H
 #define TESTS_SCENES_H
 
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#include <cmocka.h>
-
-#include <math.h>
-#include <stdbool.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "testing.h"
 
 #include "scene/scene.h"
 
 static inline vsh_scene *parse(const char *path, const char *text) {
     vsh_scene *scene = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vshi_scene_parse(path, text, strlen(text), NULL, &scene, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vshi_scene_parse(path, text, strlen(text), NULL, &scene, &failure));
     assert_non_null(scene);
     return scene;
 }

@@ -34,11 +34,7 @@ static inline vsh_shade_stats shadows_by(const vsh_occluders *occluders, const v
     options.method = method;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_shadow(occluders, &points, light, &options, NULL, visible, NULL, &stats, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_shade_shadow(occluders, &points, light, &options, NULL, visible, NULL, &stats, &failure));
     return stats;
 }
 

@@ -8,9 +8,6 @@
 #include "truth/embree.h"
 #include "truth/metrics.h"
 
-#include <stdlib.h>
-#include <vdbshade/heights.h>
-
 /* Height 0 … 1 of sample (i, j) of `n`, the same hills whatever n. */
 static inline float hill(int i, int j, int n) {
     const double x = (double)j / (n - 1), z = (double)i / (n - 1);
@@ -47,19 +44,13 @@ static inline vsh_heights_source source_of(const float *values, int columns, int
 
 static inline vsh_model *model_of(const vsh_heights_source *source, int32_t what) {
     vsh_model *model = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_model_from_heights(source, what, NULL, &model, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_model_from_heights(source, what, NULL, &model, &failure));
     return model;
 }
 
 static inline vsh_heights *heights_of(const vsh_heights_source *source) {
     vsh_heights *heights = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_heights_create(source, NULL, &heights, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_heights_create(source, NULL, &heights, &failure));
     return heights;
 }
 

@@ -3,17 +3,7 @@
 #define TESTS_TEXELS_OF_H
 
 #include "previews.h"
-#include <math.h>
-#include <setjmp.h>
-#include <stdarg.h>
-#include <stddef.h>
-#include <stdint.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include <cmocka.h>
-
-#include <vdbshade/bake.h>
+#include "testing.h"
 
 static inline vsh_lightmap_options size_of(int32_t width, int32_t height, int32_t supersample) {
     vsh_lightmap_options options = preview_lightmap_options();
@@ -26,20 +16,13 @@ static inline vsh_lightmap_options size_of(int32_t width, int32_t height, int32_
 static inline vsh_charts *create(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
                                  vsh_uv_report *reports) {
     vsh_charts *charts = NULL;
-    vsh_error error = {0};
-    const vsh_result result = vsh_charts_create(meshes, count, &options, NULL, reports, &charts, &error);
-    if (result != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_charts_create(meshes, count, &options, NULL, reports, &charts, &failure));
     return charts;
 }
 
 static inline vsh_texels *rasterize(const vsh_charts *charts) {
     vsh_texels *texels = NULL;
-    vsh_error error = {0};
-    if (vsh_texels_create(charts, NULL, &texels, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_texels_create(charts, NULL, &texels, &failure));
     return texels;
 }
 

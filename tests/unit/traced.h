@@ -6,9 +6,6 @@
 #include "previews.h"
 #include "shading.h"
 
-#include <stdlib.h>
-#include <vdbshade/trace.h>
-
 typedef struct caster {
     vsh_field *field;
     vsh_triangles *triangles;
@@ -100,7 +97,6 @@ static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale,
     vsh_mesh meshes[MAX_SOLIDS] = {{0}};
     double transforms[MAX_SOLIDS][12];
     vsh_triangles *triangles = NULL;
-    vsh_error error = {VSH_OK, ""};
     for (size_t i = 0; i < scene.count; ++i) {
         meshes[i] = mesh_of_solid(&scene.solids[i]);
         memset(transforms[i], 0, sizeof transforms[i]);
@@ -110,9 +106,7 @@ static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale,
         }
         meshes[i].transform = transforms[i];
     }
-    if (vsh_triangles_create(meshes, scene.count, NULL, &triangles, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_triangles_create(meshes, scene.count, NULL, &triangles, &failure));
     for (size_t i = 0; i < scene.count; ++i) {
         free((void *)(uintptr_t)meshes[i].positions);
         free((void *)(uintptr_t)meshes[i].indices);
@@ -156,11 +150,8 @@ static inline vsh_shade_stats cast_ao(const casting *c, int32_t method, double d
     options.ao_distance = distance;
     const vsh_points points = {count, positions, normals, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_shade_ao(occluders_of_caster(c), &points, &options, NULL, open, NULL, NULL, &stats, &error) !=
-        VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(
+        vsh_shade_ao(occluders_of_caster(c), &points, &options, NULL, open, NULL, NULL, &stats, &failure));
     return stats;
 }
 

@@ -4,16 +4,9 @@
 
 #include "shading.h"
 
-#include <stdlib.h>
-#include <vdbshade/query.h>
-#include <vdbshade/volume.h>
-
 static inline vsh_voxels *box_of(const double low[3], const double high[3], double voxel) {
     vsh_voxels *voxels = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_voxels_from_box(low, high, voxel, NULL, &voxels, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_voxels_from_box(low, high, voxel, NULL, &voxels, &failure));
     return voxels;
 }
 
@@ -24,10 +17,7 @@ static inline vsh_voxels *cube_of(double half, double voxel) {
 
 static inline vsh_voxels *band_of(const vsh_grid *grid, double band) {
     vsh_voxels *voxels = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_voxels_from_grid(grid, band, NULL, &voxels, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_voxels_from_grid(grid, band, NULL, &voxels, &failure));
     return voxels;
 }
 
@@ -35,10 +25,7 @@ static inline vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels 
                                const vsh_light *lights, size_t count, const vsh_volume_options *options,
                                const vsh_run *run) {
     vsh_volume *volume = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vsh_bake_volume(occluders, voxels, lights, count, options, run, &volume, NULL, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_bake_volume(occluders, voxels, lights, count, options, run, &volume, NULL, &failure));
     return volume;
 }
 
