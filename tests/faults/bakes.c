@@ -9,7 +9,6 @@ enum { FLAT_TEXELS = 64 };
 /* Of the package fonts-dejavu-core. */
 #define FONT "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
 
-
 static void free_image(vsh_image_file **file) {
     vsh_image_free(*file);
 }

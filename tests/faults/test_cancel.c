@@ -37,10 +37,8 @@ static int32_t progress(void *user, const char *stage, double fraction) {
 }
 
 static vsh_result run_scenario(const scenario *s, int32_t threads, watch *w, vsh_error *error) {
-    vsh_run run = vsh_run_default();
+    vsh_run run = run_watched(progress, w);
     run.threads = threads;
-    run.progress = progress;
-    run.user = w;
     *error = (vsh_error){-1, ""};
     return s->run(&run, error);
 }
@@ -55,27 +53,21 @@ static void stop_at(const scenario *s, int32_t threads, int stage, double fracti
         return;
     }
     ++*stopped;
-    if (result != VSH_ERROR_CANCELLED || error.code != result || strchr(error.message, '\n') != NULL ||
-        error.message[0] == '\0') {
-        fail_msg("%s: stage %d '%s' at %g: %s '%s'", s->name, stage, w.name, fraction,
-                 vsh_result_name(result), error.message);
-    }
-    if (w.asked > 1) {
-        fail_msg("%s: stage %d '%s' at %g: asked %d times more", s->name, stage, w.name, fraction,
-                 w.asked - 1);
-    }
-    if (faults_live() != before) {
-        fail_msg("%s: stage %d '%s' at %g: %" PRIu64 " blocks before, %" PRIu64 " after", s->name, stage,
-                 w.name, fraction, before, faults_live());
-    }
-    if (!scenarios_untouched()) {
-        fail_msg("%s: stage %d '%s' at %g: files are not as they were", s->name, stage, w.name, fraction);
-    }
+    assert_that(result == VSH_ERROR_CANCELLED && error.code == result &&
+                    strchr(error.message, '\n') == NULL && error.message[0] != '\0',
+                "%s: stage %d '%s' at %g: %s '%s'", s->name, stage, w.name, fraction, vsh_result_name(result),
+                error.message);
+    assert_that(w.asked <= 1, "%s: stage %d '%s' at %g: asked %d times more", s->name, stage, w.name,
+                fraction, w.asked - 1);
+    assert_that(faults_live() == before,
+                "%s: stage %d '%s' at %g: %" PRIu64 " blocks before, %" PRIu64 " after", s->name, stage,
+                w.name, fraction, before, faults_live());
+    assert_that(scenarios_untouched(), "%s: stage %d '%s' at %g: files are not as they were", s->name, stage,
+                w.name, fraction);
 }
 
-static void every_stage_can_be_cancelled(void **state) {
+TEST(every_stage_can_be_cancelled) {
     static const double fractions[] = {0.0, 0.1, 0.5, 0.99};
-    uint64_t stopped = 0;
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         watch all = {.stage = -1, .stop_stage = -1};
@@ -89,24 +81,14 @@ static void every_stage_can_be_cancelled(void **state) {
             for (size_t f = 0; f < sizeof fractions / sizeof fractions[0]; ++f) {
                 stop_at(s, 1 + (stage + (int)f) % 2, stage, fractions[f], &here);
             }
-            if (here < 3) {
-                fail_msg("%s: stage %d of %d (%s): only %d callbacks", s->name, stage, stages, all.name,
-                         (int)here);
-            }
-            stopped += here;
+            assert_that(here >= 3, "%s: stage %d of %d (%s): only %d callbacks", s->name, stage, stages,
+                        all.name, (int)here);
         }
-        if (run_scenario(s, 2, &all, &error) != VSH_OK) {
-            fail_msg("%s afterwards: %s", s->name, error.message);
-        }
+        assert_that(run_scenario(s, 2, &all, &error) == VSH_OK, "%s afterwards: %s", s->name, error.message);
         scenarios_untouched();
-        print_message("%-24s %4d stages\n", s->name, stages);
     }
-    print_message("cancelled %" PRIu64 " times\n", stopped);
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_stage_can_be_cancelled),
-    };
-    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
+    return run_all_tests(scenarios_begin, scenarios_end);
 }

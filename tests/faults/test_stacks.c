@@ -10,7 +10,7 @@
 #include <ucontext.h>
 #include <unistd.h>
 
-enum { STACK = 128 << 10, GUARD = 4096, PAINT = 0xa5 };
+enum { STACK = 128 << 10, GUARD = 4096 };
 
 typedef struct call {
     scenario_fn *scenario;
@@ -40,21 +40,10 @@ static unsigned char *make_stack(void) {
         mmap(NULL, GUARD + STACK, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
     assert_ptr_not_equal(pages, MAP_FAILED);
     assert_int_equal(mprotect(pages, GUARD, PROT_NONE), 0);
-    memset(pages + GUARD, PAINT, STACK);
     return pages;
 }
 
-/* Returns how many bytes of the stack were touched. */
-static size_t free_stack(unsigned char *pages) {
-    size_t untouched = 0;
-    while (untouched < STACK && pages[GUARD + untouched] == PAINT) {
-        ++untouched;
-    }
-    munmap(pages, GUARD + STACK);
-    return STACK - untouched;
-}
-
-static size_t run_on_thread(call *c) {
+static void run_on_thread(call *c) {
     unsigned char *pages = make_stack();
     pthread_attr_t attributes;
     pthread_t thread;
@@ -63,10 +52,10 @@ static size_t run_on_thread(call *c) {
     assert_int_equal(pthread_create(&thread, &attributes, on_thread, c), 0);
     assert_int_equal(pthread_join(thread, NULL), 0);
     pthread_attr_destroy(&attributes);
-    return free_stack(pages);
+    munmap(pages, GUARD + STACK);
 }
 
-static size_t run_on_fibre(call *c) {
+static void run_on_fibre(call *c) {
     static ucontext_t host, fibre;
     unsigned char *pages = make_stack();
     assert_int_equal(getcontext(&fibre), 0);
@@ -76,24 +65,20 @@ static size_t run_on_fibre(call *c) {
     fibre_call = c;
     makecontext(&fibre, on_fibre, 0);
     assert_int_equal(swapcontext(&host, &fibre), 0);
-    return free_stack(pages);
+    munmap(pages, GUARD + STACK);
 }
 
 static void run_everywhere(const char *name, call *c) {
-    static size_t (*const places[])(call *) = {run_on_thread, run_on_fibre};
-    size_t used[2];
+    static void (*const places[])(call *) = {run_on_thread, run_on_fibre};
     for (size_t i = 0; i < 2; ++i) {
         c->run.threads = (int32_t)i + 1;
-        used[i] = places[i](c);
-        if (c->result != VSH_OK) {
-            fail_msg("%s: %s", name, c->error.message);
-        }
+        places[i](c);
+        assert_that(c->result == VSH_OK, "%s: %s", name, c->error.message);
         scenarios_untouched(); /* restores the outputs */
     }
-    print_message("%-28s %3zu KiB of a thread, %3zu of a fibre\n", name, used[0] >> 10, used[1] >> 10);
 }
 
-static void every_scenario_runs(void **state) {
+TEST(every_scenario_runs) {
     if (VSHI_SANITIZED) { /* sanitizers make frames larger */
         skip();
     }
@@ -103,7 +88,7 @@ static void every_scenario_runs(void **state) {
     }
 }
 
-static void files_are_read_by_a_reader(void **state) {
+TEST(files_are_read_by_a_reader) {
     char reader[PATH_MAX];
     const ssize_t length = readlink("/proc/self/exe", reader, sizeof reader - 32);
     assert_true(length > 0);
@@ -158,7 +143,7 @@ static vsh_result read_deep(const vsh_run *run, vsh_error *error) {
     return refused ? VSH_OK : VSH_ERROR_INTERNAL;
 }
 
-static void deeply_nested_files_are_refused(void **state) {
+TEST(deeply_nested_files_are_refused) {
     if (VSHI_SANITIZED) {
         skip();
     }
@@ -193,7 +178,7 @@ static vsh_result bake_by_methods(const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-static void lightmaps_are_baked_by_every_method(void **state) {
+TEST(lightmaps_are_baked_by_every_method) {
     if (VSHI_SANITIZED) {
         skip();
     }
@@ -208,11 +193,5 @@ static void lightmaps_are_baked_by_every_method(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_scenario_runs),
-        cmocka_unit_test(deeply_nested_files_are_refused),
-        cmocka_unit_test(lightmaps_are_baked_by_every_method),
-        cmocka_unit_test(files_are_read_by_a_reader),
-    };
-    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
+    return run_all_tests(scenarios_begin, scenarios_end);
 }

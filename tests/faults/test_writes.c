@@ -95,8 +95,7 @@ static size_t temporaries(void) {
     return count;
 }
 
-static void every_write_may_fail(void **state) {
-    uint64_t sum = 0;
+TEST(every_write_may_fail) {
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         uint64_t n = 1;
@@ -107,16 +106,13 @@ static void every_write_may_fail(void **state) {
         assert_int_equal(status, NOTHING_FAILED);
         scenarios_untouched(); /* no: the last one has written */
         if (writes(s)) {
-            print_message("%-24s %4" PRIu64 " calls\n", s->name, n - 2);
             assert_true(
                 n > 4); /* one to open, flush and rename at least: what a module writes is not seen here */
-            sum += n - 2;
         }
     }
-    print_message("%" PRIu64 " calls in all\n", sum);
 }
 
-static void short_and_interrupted_writes_are_gone_on_with(void **state) {
+TEST(short_and_interrupted_writes_are_gone_on_with) {
     for (size_t i = 0; i < scenario_count; ++i) {
         if (writes(&scenarios[i])) {
             assert_int_equal(in_child(run_short, &scenarios[i], 0), FINE);
@@ -126,7 +122,7 @@ static void short_and_interrupted_writes_are_gone_on_with(void **state) {
     }
 }
 
-static void a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up(void **state) {
+TEST(a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up) {
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         size_t left = 0;
@@ -158,7 +154,7 @@ static void touch(const char *name) {
     fclose(file);
 }
 
-static void what_a_process_still_writes_and_other_files_stay(void **state) {
+TEST(what_a_process_still_writes_and_other_files_stay) {
     static const char *const others[] = {".out.7.tmp.png",     ".out.tmp.exr",   ".out.x.tmp.exr",
                                          ".out.7.tmp.exr.bak", "out.7.tmp.exr",  ".out2.7.tmp.exr",
                                          ".out.7.exr",         ".out.7-.tmp.exr"};
@@ -190,11 +186,5 @@ static void what_a_process_still_writes_and_other_files_stay(void **state) {
 }
 
 int main(void) {
-    const struct CMUnitTest tests[] = {
-        cmocka_unit_test(every_write_may_fail),
-        cmocka_unit_test(short_and_interrupted_writes_are_gone_on_with),
-        cmocka_unit_test(a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up),
-        cmocka_unit_test(what_a_process_still_writes_and_other_files_stay),
-    };
-    return cmocka_run_group_tests(tests, scenarios_begin, scenarios_end);
+    return run_all_tests(scenarios_begin, scenarios_end);
 }

@@ -10,8 +10,6 @@
 
 #include <jansson.h>
 #include <sys/stat.h>
-#include <vdbshade/lit.h>
-#include <vdbshade/reader.h>
 
 /* A document with its only buffer. */
 typedef struct asset {
@@ -67,9 +65,7 @@ static inline int put_item(asset *a, const char *name, json_t *item) {
 static inline json_t *parsed(const char *text) {
     json_error_t error;
     json_t *value = json_loads(text, JSON_DECODE_ANY, &error);
-    if (value == NULL) {
-        fail_msg("%s: %s", text, error.text);
-    }
+    assert_that(value != NULL, "%s: %s", text, error.text);
     return value;
 }
 
@@ -101,28 +97,24 @@ static inline int put_accessor(asset *a, int view, int offset, int type, int cou
 }
 
 static inline void write_glb(const asset *a, const char *name) {
-    char *text = json_dumps(a->root, JSON_COMPACT);
+    FREED char *text = json_dumps(a->root, JSON_COMPACT);
     const uint32_t length = ((uint32_t)strlen(text) + 3) & ~3U, size = ((uint32_t)a->size + 3) & ~3U;
     const uint32_t head[5] = {0x46546c67, 2, 12 + 8 + length + 8 + size, length, 0x4e4f534a};
     const uint32_t chunk[2] = {size, 0x004e4942};
-    unsigned char *all = calloc(1, head[2]);
+    FREED unsigned char *all = calloc(1, head[2]);
     memcpy(all, head, sizeof head);
     memset(all + 20, ' ', length);
     memcpy(all + 20, text, strlen(text));
     memcpy(all + 20 + length, chunk, sizeof chunk);
     memcpy(all + 28 + length, a->bytes, a->size);
     write_bytes(name, all, head[2]);
-    free(all);
-    free(text);
 }
 
 /* --- reading */
 
 static inline unsigned char *load_bytes(const char *path, size_t *size) {
     FILE *file = fopen(path, "rb");
-    if (file == NULL) {
-        fail_msg("%s is not there", path);
-    }
+    assert_that(file != NULL, "%s is not there", path);
     assert_int_equal(fseek(file, 0, SEEK_END), 0);
     *size = (size_t)ftell(file);
     rewind(file);
@@ -153,22 +145,17 @@ static inline asset load_asset(const char *path) {
     } else {
         a.root = json_loadb((char *)bytes, size, 0, &error);
         assert_non_null(text_at(&a, "buffers/0/uri"));
-        char *beside = vshi_uri_path(path, text_at(&a, "buffers/0/uri"));
+        FREED char *beside = vshi_uri_path(path, text_at(&a, "buffers/0/uri"));
         a.bytes = load_bytes(beside, &a.size);
-        free(beside);
     }
     free(bytes);
-    if (a.root == NULL) {
-        fail_msg("%s: %s", path, error.text);
-    }
+    assert_that(a.root != NULL, "%s: %s", path, error.text);
     return a;
 }
 
 static inline const json_t *item_of(const asset *a, const char *name, size_t index) {
     const json_t *item = json_array_get(json_object_get(a->root, name), index);
-    if (item == NULL) {
-        fail_msg("%s[%zu] is not there", name, index);
-    }
+    assert_that(item != NULL, "%s[%zu] is not there", name, index);
     return item;
 }
 
@@ -178,9 +165,7 @@ static inline size_t count_of(const asset *a, const char *name) {
 
 static inline size_t number_of(const json_t *object, const char *key) {
     const json_t *value = json_object_get(object, key);
-    if (!json_is_integer(value)) {
-        fail_msg("no '%s' in %s", key, json_dumps(object, 0));
-    }
+    assert_that(json_is_integer(value), "no '%s' in %s", key, json_dumps(object, 0));
     return (size_t)json_integer_value(value);
 }
 
@@ -217,9 +202,8 @@ static inline size_t attribute_of(const json_t *primitive, const char *name) {
 }
 
 static inline void assert_json_equal(const json_t *a, const json_t *b, const char *what) {
-    if (!json_equal(a, b)) {
-        fail_msg("%s: %s, expected %s", what, json_dumps(b, JSON_ENCODE_ANY), json_dumps(a, JSON_ENCODE_ANY));
-    }
+    assert_that(json_equal(a, b), "%s: %s, expected %s", what, json_dumps(b, JSON_ENCODE_ANY),
+                json_dumps(a, JSON_ENCODE_ANY));
 }
 
 static inline void assert_same_asset(const asset *a, const asset *b) {

@@ -3,8 +3,7 @@
 #define TEST_FLOOR_UNDER_BALL_H
 
 #include "images.h"
-
-#include <vdbshade/vdbshade.h>
+#include "testing.h"
 
 typedef struct case_scene {
     char mesh[300], output[300];

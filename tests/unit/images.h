@@ -85,7 +85,6 @@ static inline int entries_in_folder(void) {
 }
 
 static inline int make_folder(void **state) {
-    (void)state;
     char here[200];
     const char *place = getenv("TMPDIR");
     if (place == NULL) { /* where the tests were built */
@@ -96,7 +95,6 @@ static inline int make_folder(void **state) {
 }
 
 static inline int remove_folder(void **state) {
-    (void)state;
     if (getenv("VSH_KEEP") != NULL) {
         return 0;
     }

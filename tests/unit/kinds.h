@@ -3,6 +3,7 @@
 #define KINDS_H
 
 #include "shapes.h"
+#include "testing.h"
 
 #include "mesh/solidity.h"
 
@@ -23,9 +24,8 @@ static inline void assert_kinds(const vsh_mesh *meshes, size_t count, const char
     for (size_t i = 0; i < all && i + 1 < sizeof found; ++i) {
         found[i] = "-SRW"[c[i].kind];
     }
-    if (strcmp(found, kinds) != 0) {
-        fail_msg("%s: %s, expected %s (encloses %g)", meshes->name, found, kinds, c[0].enclosed);
-    }
+    assert_that(strcmp(found, kinds) == 0, "%s: %s, expected %s (encloses %g)", meshes->name, found, kinds,
+                c[0].enclosed);
 }
 
 static inline void assert_kinds_of(shape *s, const char *what, const char *kinds) {
@@ -38,9 +38,7 @@ static inline void assert_kinds_of(shape *s, const char *what, const char *kinds
 static inline void assert_sides(const vshi_solidity *s, size_t mesh, const vsh_mesh *of, uint8_t side) {
     const uint8_t *sides = vshi_solidity_sides(s, mesh);
     for (size_t i = 0; i < of->triangle_count; ++i) {
-        if (sides[i] != side) {
-            fail_msg("%s: triangle %zu: side %d, expected %d", of->name, i, sides[i], side);
-        }
+        assert_that(sides[i] == side, "%s: triangle %zu: side %d, expected %d", of->name, i, sides[i], side);
     }
 }
 

@@ -48,22 +48,20 @@ static inline vsh_field *floor_field(int wall) {
     const vsh_sdf sdf = {nodes, wall ? 3 : 1};
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = VOXEL;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     vsh_field *field = NULL;
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
-    vsh_grid_free(grid);
     return field;
 }
 
 static inline vsh_field *field_of_mesh(const vsh_mesh *mesh, double voxel) {
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = voxel;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     vsh_field *field = NULL;
     assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
-    vsh_grid_free(grid);
     return field;
 }
 
@@ -105,8 +103,7 @@ static inline planes *new_planes(void) {
 
 static inline void bake(const vsh_field *field, const vsh_charts *charts, const vsh_light *light,
                         const vsh_lightmap *lightmap, vsh_bake_stats *stats, int32_t threads) {
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
+    vsh_run run = run_on(threads);
     assert_ok(vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run,
                                 lightmap, stats, &failure));
 }

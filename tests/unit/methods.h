@@ -4,8 +4,6 @@
 
 #include "traced.h"
 
-#include <stdio.h>
-
 /* Shadow methods by their numbers, then those of AO. */
 enum { SHADOWS = SHADOW_METHODS, KINDS = SHADOWS + AO_METHODS };
 

@@ -16,14 +16,12 @@ const char *__lsan_default_suppressions(void) {
 static char folder[256];
 
 static inline int make_folder(void **state) {
-    (void)state;
     const char *place = getenv("TMPDIR");
     snprintf(folder, sizeof folder, "%s/vdbshade-model-XXXXXX", place != NULL ? place : ".");
     return mkdtemp(folder) == NULL;
 }
 
 static inline int remove_folder(void **state) {
-    (void)state;
     return rmdir(folder); /* fails where a test left a file */
 }
 
@@ -47,7 +45,6 @@ static inline void write_bytes(const char *name, const void *bytes, size_t size)
 static char warnings[4096];
 
 static inline void keep_warning(void *user, const char *message) {
-    (void)user;
     strncat(warnings, message, sizeof warnings - strlen(warnings) - 1);
 }
 
@@ -67,9 +64,7 @@ static inline vsh_result read_bytes(const char *name, const void *bytes, size_t 
 static inline vsh_model *read_good(const char *name, const void *bytes, size_t size) {
     vsh_model *model = NULL;
     vsh_error error = {0};
-    if (read_bytes(name, bytes, size, &model, &error) != VSH_OK) {
-        fail_msg("%s: %s", name, error.message);
-    }
+    assert_that(read_bytes(name, bytes, size, &model, &error) == VSH_OK, "%s: %s", name, error.message);
     return model;
 }
 
@@ -82,11 +77,11 @@ static inline void refused(const char *name, const char *text, vsh_result code, 
     vsh_model *model = NULL;
     vsh_error error = {0};
     const vsh_result result = read_bytes(name, text, strlen(text), &model, &error);
-    if (result != code || strstr(error.message, part) == NULL || strstr(error.message, other) == NULL ||
-        strstr(error.message, name) == NULL || strchr(error.message, '\n') != NULL) {
-        fail_msg("%s: %s '%s', expected %s with '%s' and '%s'", name, vsh_result_name(result), error.message,
-                 vsh_result_name(code), part, other);
-    }
+    assert_that(result == code && strstr(error.message, part) != NULL &&
+                    strstr(error.message, other) != NULL && strstr(error.message, name) != NULL &&
+                    strchr(error.message, '\n') == NULL,
+                "%s: %s '%s', expected %s with '%s' and '%s'", name, vsh_result_name(result), error.message,
+                vsh_result_name(code), part, other);
     assert_null(model);
 }
 

@@ -2,9 +2,9 @@
 #ifndef TESTS_PREVIEWS_H
 #define TESTS_PREVIEWS_H
 
-#include <vdbshade/bake.h>
+#include "testing.h"
+
 #include <vdbshade/render.h>
-#include <vdbshade/volume.h>
 
 /* One cone a point, sixteen for AO; 64 rays where a test then names a method by rays. */
 static inline vsh_shade_options preview_options(void) {

@@ -18,7 +18,6 @@
 #include <string>
 #include <sys/mman.h>
 #include <thread>
-#include <vdbshade/vdbshade.h>
 #include <vector>
 
 // How the next readers fail: set in the environment, which they inherit.

@@ -7,10 +7,7 @@
 
 static inline vsh_scene *parse(const char *path, const char *text) {
     vsh_scene *scene = NULL;
-    vsh_error error = {VSH_OK, ""};
-    if (vshi_scene_parse(path, text, strlen(text), NULL, &scene, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vshi_scene_parse(path, text, strlen(text), NULL, &scene, &failure));
     assert_non_null(scene);
     return scene;
 }

@@ -55,24 +55,17 @@ static inline vsh_charts *charts_of(const vsh_mesh *meshes, size_t count) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
     vsh_charts *charts = NULL;
-    vsh_error error = {0};
-    if (vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
+    assert_ok(vsh_charts_create(meshes, count, &options, NULL, NULL, &charts, &failure));
     return charts;
 }
 
 static inline vsh_stitch_report stitch(const vsh_mesh *meshes, size_t count, const vsh_lightmap *lightmap,
                                        size_t lights, double max_change) {
-    vsh_charts *charts = charts_of(meshes, count);
+    OWNED(vsh_charts) *charts = charts_of(meshes, count);
     vsh_stitch_options options = vsh_stitch_options_default();
     options.max_change = max_change;
     vsh_stitch_report report;
-    vsh_error error = {0};
-    if (vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &error) != VSH_OK) {
-        fail_msg("%s", error.message);
-    }
-    vsh_charts_free(charts);
+    assert_ok(vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &failure));
     return report;
 }
 

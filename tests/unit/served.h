@@ -45,8 +45,7 @@ static inline size_t payload_of(const char *name, unsigned char *bytes, size_t r
 static inline vsh_result decode(const unsigned char *bytes, size_t size, const char *name, uint64_t limit,
                                 vsh_model **model, vsh_error *error) {
     vshi_decoder decoder = {bytes, bytes + size, false};
-    vsh_run run = vsh_run_default();
-    run.memory_limit = limit;
+    vsh_run run = run_within(limit);
     return vshi_model_decode(&decoder, path_of(name).text, &run, model, error);
 }
 
@@ -80,9 +79,7 @@ static inline void tell_wrong(const char *name, const uint64_t *values, size_t v
             memcpy(bytes, whole, size);
             memcpy(bytes + 8 * word, &values[k], 8);
             if (decode(bytes, size, name, 0, &model, &error) != VSH_OK) {
-                if (strstr(error.message, name) == NULL) {
-                    fail_msg("word %zu: %s", word, error.message);
-                }
+                assert_that(strstr(error.message, name) != NULL, "word %zu: %s", word, error.message);
                 ++refused_count;
                 continue;
             }

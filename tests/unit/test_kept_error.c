@@ -6,8 +6,6 @@
 #include "scenes.h"
 #include "testing.h"
 
-#include <vdbshade/vdbshade.h>
-
 enum { SIZE = 96, RAYS = 1024, MOST_SOLIDS = 16, FINE = 512 };
 static const double SUN[3] = {-0.5, 0.6, -0.3}, ANGLE = 0.08726646259971647, AO_DISTANCE = 0.8;
 
@@ -102,28 +100,25 @@ static void bake(const char *casters, double max_error, int size, baked *b) {
         "[%g, %g, %g], \"angle_deg\": 5}], \"ao\": {\"distance\": %g}, \"max_error\": %g, \"receivers\": "
         "[{\"mesh\": \"%s/seeds_floor.obj\", \"size\": %d, \"output\": \"%s\"}]}",
         casters, SUN[0], SUN[1], SUN[2], AO_DISTANCE, max_error, VSH_ASSETS, size, at("out.exr"));
-    vsh_scene *scene = parse(at("scene.json"), text);
+    OWNED(vsh_scene) *scene = parse(at("scene.json"), text);
     vsh_bake_error errors[3];
     vsh_bake_report report = {.errors = errors};
     assert_ok(vsh_bake_scene(scene, NULL, NULL, &report, &failure));
     b->shadow_error = vsh_bake_error_rmse(&errors[0]);
     b->ao_error = vsh_bake_error_rmse(&errors[1]);
-    vsh_scene_free(scene);
-    vsh_image_file *file;
+    OWNED(vsh_image_file) *file = NULL;
     assert_ok(vsh_image_read(at("out.exr"), NULL, &file, &failure));
     const vsh_image image = vsh_image_view(file);
     take_plane(&image, "shadow.sun", size, b->shadow);
     take_plane(&image, "ao", size, b->ao);
     take_plane(&image, "A", size, b->valid);
-    vsh_image_free(file);
 }
 
 static void check(const char *what, double max_error, const float *values, const float *truth,
                   const float *valid, double estimate) {
     const truth_metrics m = truth_compare(SIZE * SIZE, values, truth, valid);
-    if (!(m.rmse <= max_error) || !(estimate >= 0.8 * m.rmse)) {
-        fail_msg("%s: %g is asked, %g is the error, %g the estimate", what, max_error, m.rmse, estimate);
-    }
+    assert_that(m.rmse <= max_error && estimate >= 0.8 * m.rmse,
+                "%s: %g is asked, %g is the error, %g the estimate", what, max_error, m.rmse, estimate);
 }
 
 TEST(procedural_scenes_keep_the_error_that_is_asked_for) {
@@ -179,10 +174,9 @@ TEST(a_level_set_keeps_its_voxels_beside_a_large_plane) {
     const vsh_sdf sdf = {nodes, 3};
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = 0.0117;
-    vsh_grid *grid;
+    OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     assert_ok(vsh_grid_write(grid, at("shape.vdb"), NULL, NULL, 0, &failure));
-    vsh_grid_free(grid);
     snprintf(text, sizeof text, "{\"vdb\": \"%s\"}", at("shape.vdb"));
     bake(text, 0.005, SIZE, &alone);
     snprintf(
@@ -229,11 +223,7 @@ TEST(penumbrae_rise_smoothly_at_their_ends) {
     truth_lights((truth_scene){s.solids, s.count}, (LAST - FIRST) * FINE, points[from], up, SUN,
                  tan(0.5 * ANGLE), INFINITY, 4 * RAYS, truth + from);
     const double ratio = sqrt(bend(b.shadow, truth, FIRST, LAST) / bend(truth, truth, FIRST, LAST));
-    if (!(ratio < 1.3)) {
-        fail_msg("second differences are %g times those of the truth", ratio);
-    }
+    assert_that(ratio < 1.3, "second differences are %g times those of the truth", ratio);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

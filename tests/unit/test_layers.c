@@ -4,9 +4,6 @@
 #include "shading.h"
 #include "testing.h"
 
-#include <stdlib.h>
-#include <vdbshade/bake.h>
-
 enum { SIZE = 64, COUNT = SIZE * SIZE };
 
 /* The seeds' floor; its solids one by one, and all of them. */
@@ -67,7 +64,7 @@ static vsh_layer layer_of(const vsh_field *field) {
 }
 
 TEST(where_nothing_casts_all_light_arrives_that_the_horizon_lets_through) {
-    vsh_field *empty = nothing(0.05);
+    OWNED(vsh_field) *empty = nothing(0.05);
     const vsh_light above = sun(towards, 0.2);
     const vsh_light low = sun((const double[]){1.0, 0.0, 0.0}, 0.2); /* half of it below the horizon */
     float values[COUNT];
@@ -83,12 +80,11 @@ TEST(where_nothing_casts_all_light_arrives_that_the_horizon_lets_through) {
     }
     shade_ao(occluders_of(empty), values);
     assert_all(values, 1.0, 1e-6);
-    vsh_field_free(empty);
 }
 
 /* Light from so low that the horizon cuts into it, which is not to count twice. */
 TEST(a_layer_over_nothing_is_as_the_field_itself) {
-    vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
     const vsh_layer layer = layer_of(field);
     const vsh_light lights[2] = {sun(towards, 0.2), sun((const double[]){1.0, 0.05, 0.2}, 0.2)};
     float alone[COUNT], layered[COUNT];
@@ -102,16 +98,15 @@ TEST(a_layer_over_nothing_is_as_the_field_itself) {
         }
         assert_true(least < 0.8f);
     }
-    vsh_field_free(field);
-    vsh_field_free(empty);
 }
 
 /* Two balls whose shadows do not meet: the product of their layers is the shadow of both. The truth is the
  * union in one field. Where their discs overlap in the sky, the product is that of independent shares. */
 TEST(layers_whose_shadows_do_not_meet_are_as_their_union) {
-    vsh_field *a = field_of_ball(-1.0, 0.6, -0.6, 0.3, 0.025), *b = field_of_ball(1.0, 0.6, 0.6, 0.3, 0.025);
+    OWNED(vsh_field) *a = field_of_ball(-1.0, 0.6, -0.6, 0.3, 0.025),
+                     *b = field_of_ball(1.0, 0.6, 0.6, 0.3, 0.025);
     const truth_solid both[2] = {ball(-1.0, 0.6, -0.6, 0.3), ball(1.0, 0.6, 0.6, 0.3)};
-    vsh_field *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
+    OWNED(vsh_field) *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
     const vsh_light light = sun(towards, 0.2);
     const vsh_layer layer = layer_of(b);
     float united[COUNT], layered[COUNT];
@@ -125,14 +120,11 @@ TEST(layers_whose_shadows_do_not_meet_are_as_their_union) {
     }
     assert_true(dark > 40);
     assert_true(sqrt(square / COUNT) < 2e-3);
-    vsh_field_free(a);
-    vsh_field_free(b);
-    vsh_field_free(all);
 }
 
 /* The darker of both is the field alone, bit by bit, the product its square. */
 TEST(a_layer_that_repeats_the_field_is_combined_as_it_says) {
-    vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.2);
     vsh_layer layer = layer_of(field);
     float alone[COUNT], darker[COUNT], product[COUNT], remapped[COUNT];
@@ -153,11 +145,10 @@ TEST(a_layer_that_repeats_the_field_is_combined_as_it_says) {
         between_edges += x > 0.0 && x < 1.0;
     }
     assert_true(between_edges > 20);
-    vsh_field_free(field);
 }
 
 TEST(half_the_softness_is_half_the_light) {
-    vsh_field *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = nothing(0.05);
     const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
     vsh_layer layer = layer_of(field);
     layer.softness = 0.5;
@@ -173,12 +164,10 @@ TEST(half_the_softness_is_half_the_light) {
         dark += layered[i] == 0.0f;
     }
     assert_true(dark > 50);
-    vsh_field_free(field);
-    vsh_field_free(empty);
 }
 
 TEST(a_layer_casts_for_the_lights_it_names_and_in_ao_where_it_says_so) {
-    vsh_field *field = field_of_ball(0.0, 0.4, 0.0, 0.4, 0.05), *empty = nothing(0.05);
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.4, 0.0, 0.4, 0.05), *empty = nothing(0.05);
     vsh_light light = sun(towards, 0.2);
     const char *const names[] = {"moon", "sun"};
     vsh_layer layer = layer_of(field);
@@ -205,12 +194,11 @@ TEST(a_layer_casts_for_the_lights_it_names_and_in_ao_where_it_says_so) {
     layer.ao = 0;
     shade_ao(occluders_with(empty, &layer, 1), ao);
     assert_all(ao, 1.0, 1e-6);
-    vsh_field_free(field);
-    vsh_field_free(empty);
 }
 
 TEST(deviations_of_independent_values_add_up) {
-    vsh_field *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05), *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
+    OWNED(vsh_field) *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05),
+                     *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
     const vsh_light light = sun(towards, 0.3);
     vsh_layer layer = layer_of(b);
     float va[COUNT], vb[COUNT], both[COUNT], da[COUNT], db[COUNT], dboth[COUNT];
@@ -227,8 +215,6 @@ TEST(deviations_of_independent_values_add_up) {
         }
     }
     assert_true(open > 10);
-    vsh_field_free(a);
-    vsh_field_free(b);
 }
 
 /* A lightmap of the floor y = 0 over [-1, 1]², u along x, v along -z. */
@@ -252,7 +238,7 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
     options.width = options.height = SIZE;
     options.padding = 0;
     options.ao_spacing = 1;
-    vsh_charts *texels = NULL;
+    OWNED(vsh_charts) *texels = NULL;
     assert_int_equal(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, NULL), VSH_OK);
     const double over[3] = {-1.0, 0.7, 0.1};
     const vsh_light light = sun(over, 0.2);
@@ -262,7 +248,6 @@ static void bake_floor(const vsh_field *field, const vsh_layer *layers, size_t l
     baked->stats = vsh_bake_stats_zero();
     assert_ok(vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
                                 &lightmap, &baked->stats, &failure));
-    vsh_charts_free(texels);
 }
 
 /* A wall of [-0.2, 0.2] × [0, 1] across the floor's slab: as one field, in a layer of its own, and all of it
@@ -272,9 +257,9 @@ TEST(lightmaps_are_the_same_however_casters_are_layered) {
     const truth_solid slab = {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {1.5, 0.25, 1.5}};
     const truth_solid wall = {.shape = TRUTH_BOX, .center = {0.0, 0.4, 0.0}, .half = {0.2, 0.6, 1.5}};
     const truth_solid both[2] = {slab, wall};
-    vsh_field *united = field_of((truth_scene){both, 2}, 0.04, 4.0);
-    vsh_field *ground = field_of((truth_scene){&slab, 1}, 0.04, 4.0);
-    vsh_field *alone = field_of((truth_scene){&wall, 1}, 0.04, 4.0), *empty = nothing(0.01);
+    OWNED(vsh_field) *united = field_of((truth_scene){both, 2}, 0.04, 4.0);
+    OWNED(vsh_field) *ground = field_of((truth_scene){&slab, 1}, 0.04, 4.0);
+    OWNED(vsh_field) *alone = field_of((truth_scene){&wall, 1}, 0.04, 4.0), *empty = nothing(0.01);
     const vsh_layer of_wall = layer_of(alone), of_all = layer_of(united);
     static floor_bake plain, layered;
     bake_floor(united, NULL, 0, &plain);
@@ -285,14 +270,10 @@ TEST(lightmaps_are_the_same_however_casters_are_layered) {
         assert_same(layered.shadow, plain.shadow, 0.05);
         assert_same(layered.ao, plain.ao, 0.05);
     }
-    vsh_field_free(united);
-    vsh_field_free(ground);
-    vsh_field_free(alone);
-    vsh_field_free(empty);
 }
 
 TEST(layers_out_of_range_are_refused) {
-    vsh_field *empty = nothing(0.05);
+    OWNED(vsh_field) *empty = nothing(0.05);
     const vsh_light light = sun(towards, 0.2);
     const vsh_points points = {1, positions, normals, NULL};
     float value;
@@ -318,16 +299,14 @@ TEST(layers_out_of_range_are_refused) {
         parts.field = empty;
         parts.layers = &layer;
         parts.layer_count = 1;
-        vsh_occluders *made = NULL;
+        OWNED(vsh_occluders) *made = NULL;
         vsh_result result = vsh_occluders_from_parts(&parts, &made, &failure);
         if (result == VSH_OK) { /* only the call knows the method */
             result = vsh_shade_shadow(made, &points, &light, NULL, NULL, &value, NULL, NULL, &failure);
         }
         assert_int_equal(result, VSH_ERROR_ARGUMENT);
         assert_string_equal(failure.message, cases[i].message);
-        vsh_occluders_free(made);
     }
-    vsh_field_free(empty);
 }
 
 static int fill(void **state) {
@@ -335,6 +314,4 @@ static int fill(void **state) {
     return 0;
 }
 
-int main(void) {
-    return run_all_tests(fill, NULL);
-}
+FIXTURE(fill, NULL)

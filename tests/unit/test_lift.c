@@ -6,9 +6,6 @@
 #include "testing.h"
 #include "texels_of.h"
 
-#include <stdbool.h>
-#include <vdbshade/vdbshade.h>
-
 enum { ROWS = 8, WIDTH = 256, HEIGHT = 128, TEXELS = WIDTH * HEIGHT };
 
 static const double HAIR = 1e-5; /* above the facets, for truth */
@@ -20,15 +17,7 @@ typedef struct box {
 } box;
 
 static void make_box(box *b, const double low[3], const double high[3]) {
-    static const uint32_t SIDES[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-    for (size_t v = 0; v < 8; ++v) {
-        for (size_t axis = 0; axis < 3; ++axis) {
-            b->positions[3 * v + axis] = (float)((v >> axis & 1) != 0 ? high[axis] : low[axis]);
-        }
-    }
-    b->mesh = (vsh_mesh){
-        .name = "box", .positions = b->positions, .indices = SIDES, .vertex_count = 8, .triangle_count = 12};
+    b->mesh = box_mesh(b->positions, low, high);
 }
 
 /* A smooth sphere of radius 1 that is baked, and what casts on it. */
@@ -47,11 +36,10 @@ static void open_scene(scene *s, const box *other) {
     const size_t count = other != NULL ? 2 : 1;
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.resolution = 64;
-    vsh_grid *grid = NULL;
+    OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
     assert_ok(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure));
-    vsh_grid_free(grid);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = WIDTH;
     options.height = HEIGHT;
@@ -64,9 +52,8 @@ static void open_scene(scene *s, const box *other) {
     faceted.normals = NULL;
     s->charts = create(&s->ball.mesh, 1, options, NULL);
     s->texels = rasterize(s->charts);
-    vsh_charts *facets = create(&faceted, 1, options, NULL);
+    OWNED(vsh_charts) *facets = create(&faceted, 1, options, NULL);
     s->facets = rasterize(facets);
-    vsh_charts_free(facets);
     s->lifted = vsh_texels_samples(s->texels);
     s->flat = vsh_texels_samples(s->facets);
     assert_int_equal(s->lifted.count, s->flat.count);
@@ -128,7 +115,7 @@ TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
     static float shadow[TEXELS], truth[TEXELS], *const planes[1] = {shadow};
     box bar;
     make_box(&bar, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_scene(&s, &bar);
     vsh_light lights[2] = {sun_towards(1.0, 1.0, 0.1), sun_towards(0.0, 0.0, 1.0)};
     lights[1].type = VSH_LIGHT_SPHERE;
@@ -151,14 +138,13 @@ TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
         assert_true(hidden > 100);
         assert_int_equal(off, 0);
     }
-    close_scene(&s);
 }
 
 /* A light of 11.5° each way, near and far. */
 TEST(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere) {
     static const double SINE = 0.2;
     static float shadow[TEXELS], *const planes[1] = {shadow};
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_scene(&s, NULL);
     vsh_light lights[2] = {sun_towards(1.0, 0.3, 0.2), sun_towards(1.0, 0.3, 0.2)};
     lights[0].angle = 2.0 * asin(SINE);
@@ -182,14 +168,13 @@ TEST(facets_do_not_hide_a_light_that_is_over_the_smooth_sphere) {
         assert_true(cut > 200);
         assert_int_equal(dark, 0);
     }
-    close_scene(&s);
 }
 
 /* Its light is the cosine of the smooth normal, from where the light stands over the horizon. */
 TEST(pictures_show_no_facets_where_light_grazes_a_smooth_sphere) {
     enum { SIZE = 64 };
     static float color[3 * SIZE * SIZE], alpha[SIZE * SIZE], depth[SIZE * SIZE], normal[3 * SIZE * SIZE];
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_scene(&s, NULL);
     const vsh_light light = sun_towards(1.0, 0.4, 0.2);
     const vsh_lit_meshes lit = {&s.ball.mesh, 1, NULL, {1.0, 1.0, 1.0}, 0};
@@ -214,7 +199,6 @@ TEST(pictures_show_no_facets_where_light_grazes_a_smooth_sphere) {
     }
     assert_true(near > 100);
     assert_int_equal(dark, 0);
-    close_scene(&s);
 }
 
 /* A box whose face cuts the sphere: between the facets and the smooth sphere, near the cut. */
@@ -222,7 +206,7 @@ TEST(samples_are_valid_by_where_their_facets_are) {
     static const double FACE = 0.953, CLEAR = 1e-4;
     static float ao[TEXELS], coverage[TEXELS];
     box wall;
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao, .coverage = coverage});
     size_t between = 0, wrong = 0;
@@ -234,7 +218,6 @@ TEST(samples_are_valid_by_where_their_facets_are) {
     }
     assert_true(between > 50);
     assert_int_equal(wrong, 0);
-    close_scene(&s);
 }
 
 /* A box just beyond the smooth sphere. */
@@ -242,7 +225,7 @@ TEST(ao_close_to_a_wall_is_that_of_the_facets) {
     static const double FACE = 1.018;
     static float ao[TEXELS], truth[TEXELS];
     box wall;
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
     assert_ok(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
@@ -255,29 +238,27 @@ TEST(ao_close_to_a_wall_is_that_of_the_facets) {
         }
     }
     assert_true(under > 50);
-    close_scene(&s);
 }
 
 TEST(ao_of_a_smooth_convex_body_in_the_open_is_1) {
     static float ao[TEXELS];
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_scene(&s, NULL);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
     for (size_t i = 0; i < s.flat.count; ++i) {
         assert_true(value_at(&s, ao, i) == 1.0f);
     }
-    close_scene(&s);
 }
 
 TEST(queries_take_the_normals_of_faces_for_ao) {
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_scene(&s, NULL);
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.1;
-    vsh_query *query = NULL;
+    OWNED(vsh_query) *query = NULL;
     assert_ok(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure));
-    float *ao = calloc(s.flat.count, sizeof *ao);
+    FREED float *ao = calloc(s.flat.count, sizeof *ao);
     vsh_query_output output = vsh_query_output_default();
     output.ao = ao;
     vsh_point_layout layout = vsh_point_layout_default();
@@ -295,9 +276,6 @@ TEST(queries_take_the_normals_of_faces_for_ao) {
         assert_int_equal(dark[1], 0);
         assert_true(k < 2 || dark[0] > 100);
     }
-    free(ao);
-    vsh_query_free(query);
-    close_scene(&s);
 }
 
 /* A strip of 0.2 × 3 between walls half as high as it is wide. */
@@ -309,11 +287,11 @@ static double mean_ao_between_walls(const float *normals) {
     make_box(&walls[0], (double[]){-0.1, 0.0, -0.1}, (double[]){0.0, 3.0, 0.1});
     make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
     const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     assert_ok(vsh_triangles_create(casters, 3, NULL, &triangles, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     parts.triangles = triangles;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     assert_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = 128;
@@ -321,7 +299,7 @@ static double mean_ao_between_walls(const float *normals) {
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 50.0;
     options.shade.max_error = 0.01;
-    vsh_charts *charts = create(&strip.mesh, 1, options, NULL);
+    OWNED(vsh_charts) *charts = create(&strip.mesh, 1, options, NULL);
     static float ao[128 * 128], coverage[128 * 128];
     const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
     assert_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure));
@@ -331,9 +309,6 @@ static double mean_ao_between_walls(const float *normals) {
         count += coverage[i] > 0.0f;
     }
     assert_true(count > 1000.0);
-    vsh_charts_free(charts);
-    vsh_occluders_free(occluders);
-    vsh_triangles_free(triangles);
     return sum / count;
 }
 
@@ -344,7 +319,6 @@ TEST(leaning_normals_do_not_lift_ao_over_low_walls) {
     static const float SIN = 0.17364818f, COS = 0.98480775f;
     const float leaning[12] = {0.0f, -SIN, COS, 0.0f, -SIN, COS, 0.0f, SIN, COS, 0.0f, SIN, COS};
     const double flat = mean_ao_between_walls(NULL), bent = mean_ao_between_walls(leaning);
-    print_message("mean AO: %.4f, with leaning normals %.4f\n", flat, bent);
     assert_true(flat > 0.4 && flat < 0.8);
     assert_true(fabs(bent - flat) < 0.02);
 }
@@ -356,14 +330,13 @@ TEST(a_lift_fades_as_neighbours_come_near) {
     vsh_light light = sun_towards(0.0, 1.0, 0.0);
     light.angle = 1.0;
     size_t lifted = 0, faded = 0;
-    double *before = NULL;
+    static double before[TEXELS];
     for (int w = 0; w < WALLS; ++w) {
         const double face = FIRST + STEP * w;
         box wall;
         make_box(&wall, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
-        scene s;
+        FREED_BY(close_scene) scene s;
         open_scene(&s, &wall);
-        before = before != NULL ? before : calloc(s.flat.count, sizeof *before);
         const vshi_lifter lifter = vshi_lifter_open(occluders_traced(s.field, s.triangles), &light);
         for (size_t i = 0; i < s.flat.count; ++i) {
             const vshi_lift_point point = vshi_sample_lift_point(&s.texels->samples, i);
@@ -381,16 +354,14 @@ TEST(a_lift_fades_as_neighbours_come_near) {
             }
             before[i] = length;
         }
-        close_scene(&s);
     }
-    free(before);
     assert_true(lifted > 100 && faded > 100);
 }
 
 TEST(a_light_changes_nothing_for_other_lights_and_ao) {
     static float values[5][TEXELS];
     float *const planes[5] = {values[0], values[1], values[2], values[3], values[4]};
-    scene s;
+    FREED_BY(close_scene) scene s;
     open_scene(&s, NULL);
     const vsh_light lights[2] = {sun_towards(0.0, 1.0, 0.0), sun_towards(1.0, 0.0, 0.0)};
     bake(&s, lights, 2, &(vsh_lightmap){.shadow = planes, .ao = planes[2]});
@@ -398,9 +369,4 @@ TEST(a_light_changes_nothing_for_other_lights_and_ao) {
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = planes[4]});
     assert_memory_equal(planes[1], planes[3], sizeof values[1]);
     assert_memory_equal(planes[2], planes[4], sizeof values[2]);
-    close_scene(&s);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -1,12 +1,6 @@
 /* vsh_light_check() and names of constants. */
 #include "testing.h"
 
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
-
-#include <vdbshade/vdbshade.h>
-
 static vsh_light sun(void) {
     return vsh_light_default();
 }
@@ -217,8 +211,4 @@ TEST(every_constant_has_its_name_and_every_name_its_constant) {
         assert_null(vsh_get_name(kind, 0));
         assert_int_equal(vsh_find_name(kind, "none"), -1);
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

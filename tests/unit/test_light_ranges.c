@@ -6,8 +6,6 @@
 #include "terrain.h"
 #include "testing.h"
 
-#include <vdbshade/spheres.h>
-
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
 static casting plate(double voxel) {
@@ -20,7 +18,7 @@ static casting plate(double voxel) {
 TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 0.7, 0.0};
     const truth_scene scene = {&ball, 1};
-    casting c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
+    FREED_BY(caster_free) casting c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
     const double up[3] = {0.0, 1.0, 0.0},
                  angles[] = {0.0, 1e-6, 1e-3, 0.5, 5, 20, 60, 90, 120, 150, 170, 179};
     for (size_t a = 0; a < sizeof angles / sizeof angles[0]; ++a) {
@@ -39,28 +37,21 @@ TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
             const double q[3] = {0.1 * i - 1.2, 0.0, 0.03 * i};
             for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                 const float v = cast_shadow_at(&open, &light, method, q, UP);
-                if (v != 1.0f) {
-                    fail_msg("%g degrees over an open plate, %s: %.9g", angles[a], name_of(method),
-                             (double)v);
-                }
+                assert_that(v == 1.0f, "%g degrees over an open plate, %s: %.9g", angles[a], name_of(method),
+                            (double)v);
             }
         }
-        print_message("%g degrees past a ball: cone off by %.3f, rays %.3f, adaptive %.3f, exact %.3f\n",
-                      angles[a], worst[VSH_SHADOW_CONE], worst[VSH_SHADOW_RAYS], worst[VSH_SHADOW_ADAPTIVE],
-                      worst[VSH_SHADOW_EXACT]);
         /* a ball smaller than the light is no straight edge */
         assert_true(worst[VSH_SHADOW_CONE] < (angles[a] <= 20.0 ? 0.06 : 0.6));
         /* three standard errors of 0.02; 64 rays have less */
         assert_true(worst[VSH_SHADOW_RAYS] < 0.05 && worst[VSH_SHADOW_ADAPTIVE] < 0.06);
         assert_true(worst[VSH_SHADOW_EXACT] < 0.06);
     }
-    caster_free(&c);
-    caster_free(&open);
 }
 
 /* A lamp over a plate, with nothing between them, and one under it; radii and distances of 1e-6 … 1e6. */
 TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
-    casting c = plate(0.06);
+    FREED_BY(caster_free) casting c = plate(0.06);
     for (double away = 1e-6; away < 2e6; away *= 10.0) {
         for (double radius = 1e-6; radius < 2e6; radius *= 10.0) {
             const double p[3] = {0.31, 0.0, -0.17}, over[3] = {0.31, away, -0.17};
@@ -71,19 +62,17 @@ TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
                 light = lamp(under, radius);
                 const float turned = cast_shadow_at(&c, &light, method, p, UP);
                 const float bare = cast_shadow_at(&c, &light, method, p, NULL);
-                if (lit != 1.0f || turned != 0.0f || !(bare >= 0.0f && bare <= 1.0f)) {
-                    fail_msg("%g away, radius %g, %s: %.9g, %.9g, %.9g", away, radius, name_of(method),
-                             (double)lit, (double)turned, (double)bare);
-                }
+                assert_that(lit == 1.0f && turned == 0.0f && bare >= 0.0f && bare <= 1.0f,
+                            "%g away, radius %g, %s: %.9g, %.9g, %.9g", away, radius, name_of(method),
+                            (double)lit, (double)turned, (double)bare);
             }
         }
     }
-    caster_free(&c);
 }
 
 TEST(lamps_on_a_surface_light_its_own_side) {
     const double voxel = 0.05;
-    casting c = plate(voxel);
+    FREED_BY(caster_free) casting c = plate(voxel);
     uint64_t counter = 6;
     for (int i = 0; i < 300; ++i) {
         const double p[3] = {between(&counter, -2.5, 2.5), i % 2 ? 0.4 : -1.4, between(&counter, -2.5, 2.5)};
@@ -99,7 +88,6 @@ TEST(lamps_on_a_surface_light_its_own_side) {
             }
         }
     }
-    caster_free(&c);
 }
 
 /* Balls and boxes with a lamp in them, which may be larger than a voxel: rays to it meet the caster. */
@@ -107,7 +95,7 @@ TEST(lamps_in_casters_light_nothing_outside) {
     const truth_solid solids[2] = {{TRUTH_SPHERE, {-1.2, 0.0, 0.0}, {0, 0, 0}, 0.7, 0.0},
                                    {TRUTH_BOX, {1.2, 0.1, 0.0}, {0.6, 0.5, 0.7}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
-    casting c = caster_of(scene, 0.05, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(scene, 0.05, 0.0);
     uint64_t counter = 14;
     for (int i = 0; i < 400;) {
         const double p[3] = {between(&counter, -3.0, 3.0), between(&counter, -2.0, 2.0),
@@ -120,13 +108,11 @@ TEST(lamps_in_casters_light_nothing_outside) {
         const vsh_light light = lamp(at, radii[i % 3]);
         for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
             const float v = cast_shadow_at(&c, &light, method, p, NULL);
-            if (v != 0.0f) {
-                fail_msg("%s: %.9g from (%g, %g, %g)", name_of(method), (double)v, p[0], p[1], p[2]);
-            }
+            assert_that(v == 0.0f, "%s: %.9g from (%g, %g, %g)", name_of(method), (double)v, p[0], p[1],
+                        p[2]);
         }
         ++i;
     }
-    caster_free(&c);
 }
 
 /* Over a floor with nothing near, by its height and its radius: what the receiver sees of it is what its own
@@ -134,7 +120,7 @@ TEST(lamps_in_casters_light_nothing_outside) {
  * not sink under the place that rays begin at. */
 TEST(lamps_at_the_receiver_are_cut_by_its_horizon_only) {
     const double voxel = 0.06;
-    casting c = plate(voxel);
+    FREED_BY(caster_free) casting c = plate(voxel);
     const double parts[] = {0.0, 1e-6, 0.01, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0}; /* of a voxel */
     const double elevations[] = {90.0, 60.0, 30.0};
     for (size_t d = 0; d < sizeof parts / sizeof parts[0]; ++d) {
@@ -152,15 +138,13 @@ TEST(lamps_at_the_receiver_are_cut_by_its_horizon_only) {
                 const bool whole = sine >= 1.0 || sine <= way[1];
                 for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                     const float v = cast_shadow_at(&c, &light, method, p, UP);
-                    if (whole ? v != 1.0f : !(v >= 0.4f && v <= 1.0f)) {
-                        fail_msg("%g voxels away at %g degrees, radius %g, %s: %.9g", parts[d], elevations[e],
-                                 radii[r], name_of(method), (double)v);
-                    }
+                    assert_that(whole ? v == 1.0f : v >= 0.4f && v <= 1.0f,
+                                "%g voxels away at %g degrees, radius %g, %s: %.9g", parts[d], elevations[e],
+                                radii[r], name_of(method), (double)v);
                 }
             }
         }
     }
-    caster_free(&c);
 }
 
 /* With the triangles there is a truth for it: the one ray. */
@@ -169,7 +153,7 @@ TEST(exact_of_a_light_without_size_is_one_traced_ray) {
     static double positions[3 * COUNT];
     static float normals[3 * COUNT], exact[COUNT], ray[COUNT];
     floor_texels(SIDE, positions, normals);
-    casting c = caster_of(truth_seeds(), 0.04, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const double place[3] = {0.4, 2.5, 0.3};
     const vsh_light lights[2] = {sun(truth_seeds_sun, 0.0), lamp(place, 0.0)};
     for (int l = 0; l < 2; ++l) {
@@ -183,12 +167,9 @@ TEST(exact_of_a_light_without_size_is_one_traced_ray) {
             other += exact[i] != ray[i];
             dark += ray[i] == 0.0f;
         }
-        print_message("%s: %zu of %d texels are dark, %zu are other\n", l ? "lamp" : "sun", dark, COUNT,
-                      other);
         /* the two begin a hundred-thousandth apart, which an edge may lie in: not one in a thousand */
         assert_true(other <= COUNT / 1000 && dark > COUNT / 20 && dark < COUNT);
     }
-    caster_free(&c);
 }
 
 static void turn_about(int axis, double angle, double v[3]) {
@@ -235,6 +216,7 @@ TEST(grazing_light_reaches_an_open_plate) {
         options.voxel_size = 0.04;
         vsh_grid *grid = NULL;
         assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
+        FREED_BY(caster_free)
         casting c = {field_of_grid(grid, 0.0), triangles_of_turned(&node, turn, 2.0 * half)};
         double dark = 0.0, least = 1.0;
         size_t count = 0, steps = 0;
@@ -261,10 +243,7 @@ TEST(grazing_light_reaches_an_open_plate) {
                 }
             }
         }
-        print_message("turn %d: %g of %zu grazing values below 1, least %.4f, %zu steps at most\n", turn,
-                      dark, count, least, steps);
         assert_true(dark == 0.0);
-        caster_free(&c);
     }
 }
 
@@ -324,9 +303,7 @@ static void cast_on_stage(const ranges_stage *s, const vsh_light *light, int32_t
         shadows_by(occluders_with(s->empty, &layer, 1), light, method, FLOOR, positions, normals, to);
     }
     for (size_t i = 0; i < FLOOR; ++i) {
-        if (!(to[i] >= 0.0f && to[i] <= 1.0f)) {
-            fail_msg("%s: %g", name_of(method), (double)to[i]);
-        }
+        assert_that(to[i] >= 0.0f && to[i] <= 1.0f, "%s: %g", name_of(method), (double)to[i]);
     }
 }
 
@@ -344,7 +321,7 @@ TEST(tiny_lights_are_hard_lights) {
                                    1e-20,  1e-15,  1e-10,  1e-8,   1e-7,  1e-6,  1e-5,  1e-4,
                                    1.0,    3.14,   1e3,    1e10,   1e15,  1e30,  1e99};
     static const double SOFTNESS[] = {0.0, 5e-324, 1e-300, 1e-50, 1e-9, 1000.0}; /* of layers */
-    ranges_stage s = set_up();
+    FREED_BY(tear_down) ranges_stage s = set_up();
     size_t accepted = 0;
     for (int32_t type = 0; type <= VSH_LIGHT_RECTANGLE; ++type) {
         for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
@@ -361,10 +338,8 @@ TEST(tiny_lights_are_hard_lights) {
                     ++accepted;
                     cast_on_stage(&s, &light, method, 1.0, values);
                     const double off = mean_difference(values, hard);
-                    if (SIZES[i] < 1e-3 && !(off < 0.002)) {
-                        fail_msg("type %d, caster %d, %s, size %g: off by %g", type, (int)s.kind,
-                                 name_of(method), SIZES[i], off);
-                    }
+                    assert_that(SIZES[i] >= 1e-3 || off < 0.002, "type %d, caster %d, %s, size %g: off by %g",
+                                type, (int)s.kind, name_of(method), SIZES[i], off);
                 }
             }
             const vsh_light light = light_of_size(type, 0.2);
@@ -376,14 +351,13 @@ TEST(tiny_lights_are_hard_lights) {
         }
     }
     assert_true(accepted > 4 * 12 * (size_t)(VSH_SHADOW_CLASSIC + 1) * STAGES);
-    tear_down(&s);
 }
 
 /* Tries every method and kind of caster, and the last double below 180 degrees. */
 TEST(suns_just_below_180_degrees_are_as_those_of_179_99) {
     const double angles[] = {RADIANS(179.9999), RADIANS(179.999999), RADIANS(179.99999999),
                              RADIANS(179.9999999999), nextafter(PI, 0.0)};
-    ranges_stage s = set_up();
+    FREED_BY(tear_down) ranges_stage s = set_up();
     for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
         for (int32_t method = 0; method < methods_of(&s); ++method) {
             vsh_light light = sun(truth_seeds_sun, RADIANS(179.99));
@@ -392,15 +366,9 @@ TEST(suns_just_below_180_degrees_are_as_those_of_179_99) {
                 light.angle = angles[a];
                 cast_on_stage(&s, &light, method, 1.0, values);
                 const double off = mean_difference(values, hard);
-                if (!(off < 0.02)) {
-                    fail_msg("caster %d, %s, %.17g: off by %g", (int)s.kind, name_of(method), angles[a], off);
-                }
+                assert_that(off < 0.02, "caster %d, %s, %.17g: off by %g", (int)s.kind, name_of(method),
+                            angles[a], off);
             }
         }
     }
-    tear_down(&s);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

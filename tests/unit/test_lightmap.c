@@ -38,7 +38,7 @@ TEST(a_floor_under_open_sky_is_exactly_lit) {
     const vsh_light light = sun(0.3, 1.0, 0.2, 0.2);
     static const int32_t sizes[][2] = {{SIZE, 0}, {1, 4}}; /* with their padding */
     for (int k = 0; k < 2; ++k) {
-        stage s = begin_floor(0, sizes[k][0], 1, sizes[k][1]);
+        FREED_BY(end) stage s = begin_floor(0, sizes[k][0], 1, sizes[k][1]);
         bake_stage(&s, &light);
         const size_t texels = (size_t)(sizes[k][0] * sizes[k][0]);
         for (size_t i = 0; i < texels; ++i) {
@@ -48,14 +48,13 @@ TEST(a_floor_under_open_sky_is_exactly_lit) {
         assert_true(texels == TEXELS || isnan(s.p->coverage[texels]));
         assert_int_equal(s.stats.texels, texels);
         assert_int_equal(s.stats.invalid_texels, 0);
-        end(&s);
     }
 }
 
 TEST(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side) {
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     uint64_t invalid_by_mesh[1] = {77}, invalid = 0;
-    stage s = begin_floor(1, SIZE, 1, 0);
+    FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
     s.stats.invalid_by_mesh = invalid_by_mesh;
     bake_stage(&s, &light);
     for (uint32_t i = 0; i < TEXELS; ++i) {
@@ -75,7 +74,6 @@ TEST(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side) {
     assert_int_equal(invalid, s.stats.invalid_texels);
     assert_int_equal(invalid, invalid_by_mesh[0]);
     assert_int_equal(s.stats.texels, TEXELS);
-    end(&s);
 }
 
 TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
@@ -87,7 +85,7 @@ TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
     mesh.positions = positions;
     mesh.uvs = uvs;
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    stage s = begin(floor_field(1), &mesh, SIZE, 1, PADDING);
+    FREED_BY(end) stage s = begin(floor_field(1), &mesh, SIZE, 1, PADDING);
     bake_stage(&s, &light);
     const planes *p = s.p;
     for (int i = 0; i < TEXELS; ++i) {
@@ -102,7 +100,6 @@ TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
         }
         assert_true(p->shadow[i] < 0.01f);
     }
-    end(&s);
 }
 
 TEST(a_texel_is_the_mean_of_its_valid_samples) {
@@ -158,7 +155,7 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
                            .triangle_count = i / 3};
     const vsh_light light = sun(0.3, 0.9, 0.2, 0.01);
     const double length = sqrt(0.09 + 0.81 + 0.04);
-    stage s = begin(field_of_mesh(&mesh, 0.02), &mesh, SIZE, 1, 0);
+    FREED_BY(end) stage s = begin(field_of_mesh(&mesh, 0.02), &mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
     assert_int_equal(s.stats.invalid_texels, 0);
     vsh_texels *texels = NULL;
@@ -172,19 +169,17 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
         assert_true(cosine >= -0.01 || value == 0.0f);
     }
     vsh_texels_free(texels);
-    end(&s);
 }
 
 TEST(an_open_sheet_does_not_shade_itself) {
     const vsh_mesh mesh = floor_mesh();
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
-    stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
+    FREED_BY(end) stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
     for (int i = 0; i < TEXELS; ++i) {
         assert_true(s.p->coverage[i] == 1.0f);
         assert_true(s.p->shadow[i] == 1.0f);
     }
-    end(&s);
 }
 
 /* --- How a lightmap is baked: its planes, their errors, threads, options, limits. */
@@ -194,7 +189,7 @@ TEST(irradiance_is_visibility_times_colour_times_cosine_times_ao) {
     light.color[0] = 2.0;
     light.color[1] = 0.5;
     light.color[2] = 0.0;
-    stage s = begin_floor(1, SIZE, 1, 0);
+    FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
     bake_stage(&s, &light);
     planes *p = s.p, *alone = new_planes();
     alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
@@ -207,12 +202,11 @@ TEST(irradiance_is_visibility_times_colour_times_cosine_times_ao) {
         assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * lit) < 1e-5);
     }
     free(alone);
-    end(&s);
 }
 
 TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    stage s = begin_floor(1, SIZE, 1, 2);
+    FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 2);
     bake_stage(&s, &light);
     planes *some = new_planes();
     const vsh_lightmap coverage = {.coverage = some->coverage}, ao = {.ao = some->ao},
@@ -227,24 +221,21 @@ TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
     assert_memory_equal(some->ao, s.p->ao, sizeof some->ao);
     assert_memory_equal(some->shadow, s.p->shadow, sizeof some->shadow);
     free(some);
-    end(&s);
 }
 
 TEST(any_number_of_threads_gives_the_same_bits) {
     const vsh_light light = sun(1.0, 0.7, 0.3, 0.2);
-    stage s = begin_floor(1, SIZE, 3, 4);
+    FREED_BY(end) stage s = begin_floor(1, SIZE, 3, 4);
     bake(s.field, s.charts, &light, &s.p->all, NULL, 1);
     static const int32_t threads[] = {2, 5};
     for (int t = 0; t < 2; ++t) {
-        planes *p = new_planes();
+        FREED planes *p = new_planes();
         bake(s.field, s.charts, &light, &p->all, NULL, threads[t]);
         assert_memory_equal(p->shadow, s.p->shadow, sizeof p->shadow);
         assert_memory_equal(p->ao, s.p->ao, sizeof p->ao);
         assert_memory_equal(p->irradiance, s.p->irradiance, sizeof p->irradiance);
         assert_memory_equal(p->coverage, s.p->coverage, sizeof p->coverage);
-        free(p);
     }
-    end(&s);
 }
 
 static int32_t stop_in_bake(void *user, const char *step, double fraction) {
@@ -263,27 +254,25 @@ TEST(bad_options_limits_and_cancelling_are_reported) {
                  {1.0, 0.0, 0.05, 1000, NULL, VSH_ERROR_LIMIT, ""},
                  {1.0, 0.0, 0.05, 0, stop_in_bake, VSH_ERROR_CANCELLED, ""},
                  {1.0, 0.0, -1.0, 0, NULL, VSH_ERROR_ARGUMENT, ""}};
-    stage s = begin_floor(1, SIZE, 1, 0);
+    FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         const vsh_light light = sun(1.0, 1.0, 0.0, cases[i].angle);
         vsh_shade_options options = preview_options();
         options.start_offset = cases[i].start_offset;
         options.surface_offset = cases[i].surface_offset;
-        vsh_run run = vsh_run_default();
-        run.memory_limit = cases[i].memory_limit;
+        vsh_run run = run_within(cases[i].memory_limit);
         run.progress = cases[i].progress;
         assert_fails(vsh_bake_lightmap(occluders_of(s.field), s.charts, &light, 1, &options, &run, &s.p->all,
                                        NULL, &failure),
                      cases[i].code, cases[i].part);
     }
-    end(&s);
 }
 
 /* Bakes the floor under a wall by `method` into planes of values and errors. */
 static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_error, float *ao_error) {
-    vsh_field *field = floor_field(1);
+    OWNED(vsh_field) *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    vsh_charts *charts = make_texels(&mesh, 1, SIZE, 2, 4);
+    OWNED(vsh_charts) *charts = make_texels(&mesh, 1, SIZE, 2, 4);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
     vsh_shade_options shade = preview_options();
     shade.method = method;
@@ -293,8 +282,6 @@ static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_e
     vsh_bake_stats stats = vsh_bake_stats_zero();
     assert_ok(
         vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &shade, NULL, &lightmap, &stats, &failure));
-    vsh_charts_free(charts);
-    vsh_field_free(field);
     return stats;
 }
 
@@ -317,8 +304,4 @@ TEST(errors_are_baked_where_the_method_knows_them) {
     for (size_t i = 0; i < TEXELS; ++i) {
         assert_true(errors[i] == 0.0f);
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -2,10 +2,6 @@
 #include "shade/links.h"
 #include "testing.h"
 
-#include <math.h>
-#include <stdbool.h>
-#include <string.h>
-
 enum { WIDTH = 24, HEIGHT = 16, TEXELS = WIDTH * HEIGHT };
 
 /* An image of points; `at` as vshi_links_find() wants it, points in another order than texels. */
@@ -58,9 +54,8 @@ static void assert_links(image *m, expected_fn *expected) {
                 const vshi_window_texel *e = &m->texels[y * WIDTH + x];
                 const bool left = x > 0 && expected(x - 1, y, x, y),
                            above = y > 0 && expected(x, y - 1, x, y);
-                if (e->left != left || e->above != above) {
-                    fail_msg("scale %g, texel %d, %d: left %d, above %d", scales[s], x, y, e->left, e->above);
-                }
+                assert_that(e->left == left && e->above == above, "scale %g, texel %d, %d: left %d, above %d",
+                            scales[s], x, y, e->left, e->above);
             }
         }
     }
@@ -78,8 +73,6 @@ static bool on_one_side(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
 }
 
 static bool on_one_side_of_rows(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
-    (void)x0;
-    (void)x1;
     return (y0 < BORDER) == (y1 < BORDER);
 }
 
@@ -266,8 +259,4 @@ TEST(lattices_do_not_hang_together_over_a_gap_between_their_texels) {
             }
         }
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -66,7 +66,7 @@ static size_t list_triangles(const vsh_model *model, const vsh_lit_mesh *lit, in
 /* What the output shows, read again: each triangle of the model where it was, with the UVs of the atlas. */
 static void assert_shows(const char *path, const vsh_model *model, const vsh_lit_mesh *lit) {
     static triangle expected[4096], found[4096];
-    vsh_model *again = read_model(path);
+    OWNED(vsh_model) *again = read_model(path);
     const size_t count = list_triangles(model, lit, -1, expected);
     assert_int_equal(list_triangles(again, NULL, -1, found), count);
     for (size_t i = 0; i < count; ++i) {
@@ -74,14 +74,11 @@ static void assert_shows(const char *path, const vsh_model *model, const vsh_lit
         while (k < count && !is_near(&expected[i], &found[k])) {
             ++k;
         }
-        if (k == count) {
-            fail_msg("%s: triangle %zu at (%g, %g, %g) with (%g, %g) is not there", path, i,
-                     expected[i].place[0], expected[i].place[1], expected[i].place[2], expected[i].uv[0],
-                     expected[i].uv[1]);
-        }
+        assert_that(k != count, "%s: triangle %zu at (%g, %g, %g) with (%g, %g) is not there", path, i,
+                    expected[i].place[0], expected[i].place[1], expected[i].place[2], expected[i].uv[0],
+                    expected[i].uv[1]);
         found[k].uv[0] = INFINITY; /* each once */
     }
-    vsh_model_free(again);
 }
 
 /* --- tests */
@@ -93,20 +90,18 @@ TEST(lit_by_their_own_uvs_files_change_in_their_materials_alone) {
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
     for (size_t i = 0; i < sizeof paths / sizeof paths[0]; ++i) {
-        vsh_model *model = read_model(paths[i]);
+        OWNED(vsh_model) *model = read_model(paths[i]);
+        FREED_BY(free_asset)
         asset in = load_asset(paths[i]), out = light_model(paths[i], model, NULL, &options);
         assert_kept(&in, &out, "", "occlusionTexture");
         for (size_t m = 0; m < count_of(&in, "meshes"); ++m) { /* some get a white material */
             assert_alike_but(primitive_of(&in, m, 0), primitive_of(&out, m, 0), "material", "a primitive");
         }
-        free_asset(&in);
-        free_asset(&out);
-        vsh_model_free(model);
     }
 }
 
 TEST(new_uvs_leave_all_other_accessors_alone) {
-    lighting l = begin_lighting(make_rich(), false);
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), false);
     light_white(&l, VSH_LIT_OCCLUSION);
     forget_instances(&l);
     assert_kept(&l.in, &l.out, "mesh", "occlusionTexture");
@@ -134,7 +129,6 @@ TEST(new_uvs_leave_all_other_accessors_alone) {
     assert_true(attribute_of(primitive_of(&l.out, 1, 0), "TEXCOORD_0") >= count_of(&l.in, "accessors"));
     assert_int_equal(number_of(primitive_of(&l.out, 3, 0), "mode"), 5);
     assert_json_equal(primitive_of(&l.in, 3, 1), primitive_of(&l.out, 3, 1), "points");
-    end_lighting(&l);
 }
 
 /* Element i of the new accessor is that of the old one which the atlas says, byte by byte. */
@@ -153,7 +147,7 @@ TEST(split_vertices_take_all_their_attributes_along) {
         const char *name;
         size_t size;
     } attributes[] = {{"POSITION", 12}, {"NORMAL", 12}, {"TEXCOORD_0", 4}, {"COLOR_0", 3}, {"_ID", 2}};
-    lighting l = begin_lighting(make_rich(), true);
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), true);
     light_white(&l, VSH_LIT_OCCLUSION);
     forget_instances(&l);
     assert_kept(&l.in, &l.out, "mesh", "occlusionTexture");
@@ -184,7 +178,6 @@ TEST(split_vertices_take_all_their_attributes_along) {
     assert_gathered(&l, attribute_of(bare, "WEIGHTS_0"), attribute_of(skinned, "WEIGHTS_0"), 16);
     assert_gathered(&l, attribute_of(bare, "JOINTS_0"), attribute_of(skinned, "JOINTS_0"), 4);
     assert_null(json_object_get(primitive_of(&l.out, 3, 0), "mode"));
-    end_lighting(&l);
 }
 
 /* Floats that an animation or a skin refers to. */
@@ -216,7 +209,7 @@ TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
             put_item(&in, "images",
                      json_pack("{s:I,s:s}", "bufferView", (json_int_t)image_view, "mimeType", "image/png"));
         }
-        lighting l = begin_lighting(in, true);
+        FREED_BY(end_lighting) lighting l = begin_lighting(in, true);
         const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
         const vsh_lit_options options = options_of(&image, 1);
         /* not by light_white(), which keeps it for validators: the image is none */
@@ -242,7 +235,6 @@ TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
         }
         sizes[known] = l.out.size;
         accessors[known] = count_of(&l.out, "accessors");
-        end_lighting(&l);
     }
     /* UVs, colours, numbers, joints and weights, four lists of indices, a target of two, two of instances */
     assert_int_equal(accessors[0] - accessors[1], 1 + 1 + 1 + 2 + 4 + 2 + 2);
@@ -250,7 +242,7 @@ TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
 }
 
 TEST(instances_become_nodes_where_their_uvs_differ) {
-    lighting l = begin_lighting(make_rich(), false);
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), false);
     light_white(&l, VSH_LIT_OCCLUSION);
     const json_t *many = item_of(&l.out, "nodes", 7);
     assert_null(json_object_get(many, "mesh"));
@@ -278,7 +270,6 @@ TEST(instances_become_nodes_where_their_uvs_differ) {
     l.lit = NULL;
     light_white(&l, VSH_LIT_OCCLUSION);
     assert_kept(&l.in, &l.out, "mesh", "occlusionTexture");
-    end_lighting(&l);
 }
 
 /* Every other quad lies on a second page. */
@@ -295,7 +286,7 @@ static void put_on_pages(vsh_lit_mesh *lit, size_t count) {
 TEST(primitives_on_two_pages_become_two) {
     static const uint32_t pages[2] = {0, 1};
     for (int split = 0; split < 2; ++split) {
-        lighting l = begin_lighting(make_rich(), split != 0);
+        FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), split != 0);
         put_on_pages(l.lit, vsh_model_mesh_count(l.model));
         const vsh_lit_image images[2] = {white_image(VSH_LIT_LIGHTMAP, 1), white_image(VSH_LIT_LIGHTMAP, 0)};
         vsh_lit_options options = options_of(images, 2);
@@ -322,7 +313,6 @@ TEST(primitives_on_two_pages_become_two) {
         }
         assert_true(textures[0] == textures[1] + 1); /* in the order that images were given in */
         assert_int_equal(triangles, 2 * QUADS);
-        end_lighting(&l);
     }
 }
 
@@ -357,7 +347,7 @@ TEST(compressed_primitives_that_change_are_written_plain) {
     static const char path[] = VSH_MODELS "/scene_draco.glb";
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
-    vsh_model *model = read_model(path);
+    OWNED(vsh_model) *model = read_model(path);
     for (int split = 0; split < 2; ++split) {
         vsh_lit_mesh *lit = make_all_lit(model, split != 0);
         write_lit(path, model, lit, &options, path_of("out.glb").text);
@@ -370,9 +360,6 @@ TEST(compressed_primitives_that_change_are_written_plain) {
         free_lit(lit, vsh_model_mesh_count(model));
         remove_file("out.glb");
     }
-    vsh_model_free(model);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -34,7 +34,7 @@ static asset make_scene(void) {
 /* Lights a file, whose first object may be on a page of its own. */
 static void light_file(const char *in, int purposes, uint32_t pages, int32_t place, const char *out,
                        const vsh_run *run) {
-    vsh_model *model = read_model(path_of(in).text);
+    OWNED(vsh_model) *model = read_model(path_of(in).text);
     vsh_lit_mesh *lit = make_all_lit(model, true);
     lit[0].page = pages - 1;
     vsh_lit_image images[4];
@@ -49,7 +49,6 @@ static void light_file(const char *in, int purposes, uint32_t pages, int32_t pla
     assert_ok(vsh_lit_write(path_of(in).text, model, lit, &options, path_of(out).text, run, &failure));
     keep_file(path_of(out).text);
     free_lit(lit, vsh_model_mesh_count(model));
-    vsh_model_free(model);
 }
 
 static asset light_again(const asset *in, int purposes, uint32_t pages) {
@@ -239,6 +238,4 @@ TEST(files_that_were_made_are_left_and_no_longer_named) {
     assert_int_equal(rmdir(path_of("other").text), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

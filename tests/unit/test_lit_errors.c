@@ -15,15 +15,13 @@ static void begin_output(void) {
 static void assert_refused(vsh_result result, const char *part) {
     assert_int_not_equal(result, VSH_OK);
     assert_int_equal(result, failure.code);
-    if (failure.message[0] == '\0' || strchr(failure.message, '\n') != NULL ||
-        strstr(failure.message, part) == NULL) {
-        fail_msg("'%s' is no error of '%s'", failure.message, part);
-    }
+    assert_that(failure.message[0] != '\0' && strchr(failure.message, '\n') == NULL &&
+                    strstr(failure.message, part) != NULL,
+                "'%s' is no error of '%s'", failure.message, part);
     size_t size;
-    unsigned char *bytes = load_bytes(path_of("out.glb").text, &size);
+    FREED unsigned char *bytes = load_bytes(path_of("out.glb").text, &size);
     assert_int_equal(size, sizeof old_output);
     assert_memory_equal(bytes, old_output, size);
-    free(bytes);
 }
 
 /* The rich asset lit by vertices of their own, with extensions that are known alone, so that what is replaced
@@ -86,7 +84,7 @@ TEST(damaged_documents_are_refused) {
         {"", "extensionsRequired", "[\"VENDOR_none\"]", "VENDOR_none"},
         {"", "asset", "{\"version\":\"1.0\"}", "1.0"},
     };
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     for (size_t i = 0; i < sizeof damages / sizeof damages[0]; ++i) {
         asset damaged = {json_deep_copy(l.in.root), l.in.bytes, l.in.size};
         set_at(&damaged, damages[i].object, damages[i].key, parsed(damages[i].value));
@@ -95,11 +93,10 @@ TEST(damaged_documents_are_refused) {
         assert_refused(write_in(&l, NULL), damages[i].part);
         json_decref(damaged.root);
     }
-    end_lighting(&l);
 }
 
 TEST(damaged_buffers_are_refused) {
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     /* one triangle is turned over, the counts stay */
     unsigned char *indices =
         l.in.bytes + (element_of(&l.in, number_of(primitive_of(&l.in, 1, 0), "indices"), 0, 2) - l.in.bytes);
@@ -127,27 +124,24 @@ TEST(damaged_buffers_are_refused) {
         assert_refused(write_in(&l, NULL), missing[i][1]);
     }
     assert_int_equal(failure.code, VSH_ERROR_UNSUPPORTED);
-    end_lighting(&l);
 }
 
 TEST(cut_files_are_refused_at_every_length) {
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     size_t size;
-    unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
+    FREED unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
     for (size_t cut = 0; cut < size; cut += cut < 64 || cut + 64 > size ? 1 : 37) {
         write_bytes("in.glb", bytes, cut);
         assert_refused(write_in(&l, NULL), "");
     }
-    free(bytes);
-    end_lighting(&l);
 }
 
 /* Whatever a byte becomes, it is a sound file or a refusal. */
 TEST(flipped_bytes_end_in_a_file_or_a_reason) {
     enum { TRIES = 500 };
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     size_t size, written = 0;
-    unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
+    FREED unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
     uint32_t json;
     memcpy(&json, bytes + 12, sizeof json);
     for (uint32_t i = 0; i < TRIES; ++i) {
@@ -169,15 +163,13 @@ TEST(flipped_bytes_end_in_a_file_or_a_reason) {
         bytes[at] = old;
     }
     assert_in_range(written, TRIES / 20, TRIES - TRIES / 20); /* of both kinds */
-    free(bytes);
-    end_lighting(&l);
 }
 
 /* --- callers */
 
 TEST(atlases_that_do_not_fit_are_refused) {
     enum { CASES = 11 };
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     const vsh_lit_mesh good = l.lit[0];
     vsh_lit_mesh other = make_lit(l.model, 0, true), bad[CASES];
     uint32_t *charts = calloc(good.triangle_count, sizeof *charts);
@@ -209,13 +201,12 @@ TEST(atlases_that_do_not_fit_are_refused) {
     *list = other;
     list->charts = charts;
     free_lit(list, 1);
-    end_lighting(&l);
 }
 
 TEST(images_out_of_range_are_refused) {
     static const float value[1] = {1.0F};
     static const float *const one[1] = {value};
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     const vsh_lit_image white = white_image(0, 0),
                         bad[][2] = {
                             {white_image(VSH_LIT_PURPOSES, 0)},
@@ -244,11 +235,10 @@ TEST(images_out_of_range_are_refused) {
     }
     assert_fails(vsh_lit_check_uvs(NULL, l.model, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
     assert_fails(vsh_lit_check_uvs(NULL, NULL, l.lit, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    end_lighting(&l);
 }
 
 TEST(outputs_that_are_inputs_are_refused) {
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     static const struct {
         const char *output;
         vsh_result code;
@@ -259,12 +249,11 @@ TEST(outputs_that_are_inputs_are_refused) {
                                    path_of(cases[i].output).text, NULL, &failure),
                      cases[i].code, "");
     }
-    end_lighting(&l);
 }
 
 /* What another document may use too. */
 TEST(files_of_the_input_are_not_replaced_but_others_named) {
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     write_bytes("all.bin", l.in.bytes, l.in.size);
     set_at(&l.in, "buffers/0", "uri", json_string("all.bin"));
     write_glb(&l.in, "in.glb");
@@ -281,7 +270,6 @@ TEST(files_of_the_input_are_not_replaced_but_others_named) {
     remove_file("all.gltf");
     remove_file("all.1.bin");
     remove_file("all.bin");
-    end_lighting(&l);
 }
 
 static int32_t stop(void *user, const char *stage, double fraction) {
@@ -289,7 +277,7 @@ static int32_t stop(void *user, const char *stage, double fraction) {
 }
 
 TEST(limits_and_cancelling_leave_the_old_file) {
-    lighting l = begin_sound();
+    FREED_BY(end_lighting) lighting l = begin_sound();
     vsh_run run = vsh_run_default();
     for (run.memory_limit = 1000; run.memory_limit < 100000; run.memory_limit *= 3) {
         assert_fails(write_in(&l, &run), VSH_ERROR_LIMIT, "");
@@ -302,9 +290,6 @@ TEST(limits_and_cancelling_leave_the_old_file) {
         assert_fails(write_in(&l, &run), VSH_ERROR_CANCELLED, "");
         assert_refused(failure.code, "");
     }
-    end_lighting(&l);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -5,8 +5,6 @@
 #include "base/elementary.h"
 #include "sandbox/reader.h"
 
-#include <vdbshade/image.h>
-
 enum { WIDTH = 7, HEIGHT = 3, TEXELS = WIDTH * HEIGHT };
 
 /* --- what they hold */
@@ -30,10 +28,8 @@ static void assert_values(const vsh_image_file *file, int32_t channel, const dou
     assert_int_equal(image.height, HEIGHT);
     for (int i = 0; i < TEXELS; ++i) {
         const double error = fabs((double)image.planes[channel][i] - expected[i]);
-        if (!(error <= 0.5 / most + 1e-6)) {
-            fail_msg("channel %d, texel %d: %.9g, expected %.9g", channel, i,
-                     (double)image.planes[channel][i], expected[i]);
-        }
+        assert_that(error <= 0.5 / most + 1e-6, "channel %d, texel %d: %.9g, expected %.9g", channel, i,
+                    (double)image.planes[channel][i], expected[i]);
     }
 }
 
@@ -41,9 +37,8 @@ static void assert_values(const vsh_image_file *file, int32_t channel, const dou
 static asset write_scene(const vsh_lit_image *images, size_t count) {
     static const char path[] = VSH_MODELS "/scene.glb";
     const vsh_lit_options options = options_of(images, count);
-    vsh_model *model = read_model(path);
+    OWNED(vsh_model) *model = read_model(path);
     asset out = light_model(path, model, NULL, &options);
-    vsh_model_free(model);
     return out;
 }
 
@@ -74,20 +69,17 @@ TEST(planes_become_images_of_their_values) {
         const double most = bits == 8 ? 255.0 : 65535.0;
         const vsh_lit_image images[2] = {image_with(VSH_LIT_OCCLUSION, views, 1, bits, 0.0),
                                          image_with(VSH_LIT_LIGHTMAP, views + 1, 3, bits, 2.0)};
-        asset out = write_scene(images, 2);
+        FREED_BY(free_asset) asset out = write_scene(images, 2);
         const json_t *lightmap = json_at(out.root, "materials/0/extensions/MOZ_lightmap");
-        vsh_image_file *file =
+        OWNED(vsh_image_file) *file =
             image_of(&out, number_of(json_at(out.root, "materials/0/occlusionTexture"), "index"));
         assert_values(file, 0, expected[0], most);
-        vsh_image_free(file);
         /* what is over 1 is in the intensity */
         assert_true(json_number_value(json_object_get(lightmap, "intensity")) == 2.0 * 5.5);
-        file = image_of(&out, number_of(lightmap, "index"));
+        OWNED(vsh_image_file) *lit = image_of(&out, number_of(lightmap, "index"));
         for (int c = 0; c < 3; ++c) {
-            assert_values(file, c, expected[1 + c], most);
+            assert_values(lit, c, expected[1 + c], most);
         }
-        vsh_image_free(file);
-        free_asset(&out);
     }
 }
 
@@ -100,20 +92,18 @@ TEST(previews_are_unlit_base_colour_of_srgb) {
     }
     const float *const one[1] = {grey};
     const vsh_lit_image image = image_with(VSH_LIT_PREVIEW, one, 1, 0, 0.75);
-    asset out = write_scene(&image, 1);
+    FREED_BY(free_asset) asset out = write_scene(&image, 1);
     assert_non_null(json_at(out.root, "materials/0/extensions/KHR_materials_unlit"));
     const json_t *base = json_at(out.root, "materials/0/pbrMetallicRoughness/baseColorTexture");
     assert_int_equal(number_of(base, "texCoord"), 1);
-    vsh_image_file *file = image_of(&out, number_of(base, "index"));
+    OWNED(vsh_image_file) *file = image_of(&out, number_of(base, "index"));
     assert_values(file, 0, expected, 255.0);
-    vsh_image_free(file);
-    free_asset(&out);
 }
 
 /* --- materials */
 
 TEST(materials_are_copied_only_where_they_must) {
-    lighting l = begin_lighting(make_rich(), false);
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), false);
     light_white(&l, VSH_LIT_OCCLUSION);
     /* tiles: in set 1, and as it was for the mesh in the other scene. leaf: as variant there too, in set 1 as
      * a variant and by the instances, in set 0 by the skinned mesh. rail: set 0, and points. White: set 1 */
@@ -147,13 +137,12 @@ TEST(materials_are_copied_only_where_they_must) {
     for (size_t m = 0; m < 3; ++m) {
         assert_non_null(json_object_get(item_of(&l.out, "materials", m), "occlusionTexture"));
     }
-    end_lighting(&l);
 }
 
 TEST(cut_out_materials_have_no_preview) {
     asset in = make_rich();
     set_at(&in, "materials/0", "alphaMode", json_string("MASK"));
-    lighting l = begin_lighting(in, false);
+    FREED_BY(end_lighting) lighting l = begin_lighting(in, false);
     light_white(&l, VSH_LIT_PREVIEW);
     for (size_t m = 0; m < count_of(&l.out, "materials"); ++m) {
         const json_t *material = item_of(&l.out, "materials", m);
@@ -162,14 +151,13 @@ TEST(cut_out_materials_have_no_preview) {
             assert_json_equal(item_of(&in, "materials", 0), material, "tiles");
         }
     }
-    end_lighting(&l);
 }
 
 /* --- where they go */
 
 TEST(images_go_beside_a_gltf_with_its_buffer) {
     static const uint32_t pages[2] = {0, 1};
-    lighting l = begin_lighting(make_rich(), false);
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), false);
     l.lit[0].page = 1;
     const vsh_lit_image images[2] = {white_image(VSH_LIT_LIGHTMAP, 0), white_image(VSH_LIT_LIGHTMAP, 1)};
     vsh_lit_options options = options_of(images, 2);
@@ -185,19 +173,16 @@ TEST(images_go_beside_a_gltf_with_its_buffer) {
     static const char *const written[] = {"a b.lightmap.0.png", "a b.lightmap.1.png"};
     for (size_t i = 0; i < 2; ++i) {
         size_t size;
-        unsigned char *bytes = load_bytes(path_of(written[i]).text, &size);
+        FREED unsigned char *bytes = load_bytes(path_of(written[i]).text, &size);
         assert_int_equal(size, sizeof white_png);
         assert_memory_equal(bytes, white_png, size);
-        free(bytes);
         remove_file(written[i]);
     }
     /* and it can be read again */
-    vsh_model *again = read_model(path_of("a b.gltf").text);
+    OWNED(vsh_model) *again = read_model(path_of("a b.gltf").text);
     assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(l.model));
-    vsh_model_free(again);
     remove_file("a b.gltf");
     remove_file("a b.bin");
-    end_lighting(&l);
 }
 
 TEST(images_come_along_into_another_folder) {
@@ -207,7 +192,7 @@ TEST(images_come_along_into_another_folder) {
     put_item(&in, "images", parsed("{\"uri\":\"https://a.b/c.png\"}"));
     assert_int_equal(symlink("/etc/passwd", path_of("link.png").text), 0);
     assert_int_equal(mkdir(path_of("other").text, 0777), 0);
-    lighting l = begin_lighting(in, false);
+    FREED_BY(end_lighting) lighting l = begin_lighting(in, false);
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     warnings[0] = '\0';
@@ -226,7 +211,6 @@ TEST(images_come_along_into_another_folder) {
     remove_file("other/out.glb");
     assert_int_equal(rmdir(path_of("other").text), 0);
     remove_file("link.png");
-    end_lighting(&l);
 }
 
 /* --- the reader */

@@ -31,7 +31,7 @@ static void bake_floor(double scale, const double offset[3], picture *p) {
     for (size_t i = 0; i < 3 * COUNT; ++i) {
         places[i] = scale * (positions[i] + offset[i % 3]);
     }
-    casting c = caster_of_moved(truth_seeds(), 0.04, scale, offset, 8.0 * scale);
+    FREED_BY(caster_free) casting c = caster_of_moved(truth_seeds(), 0.04, scale, offset, 8.0 * scale);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     for (int kind = 0; kind < KINDS; ++kind) {
         const vsh_shade_stats stats =
@@ -39,17 +39,14 @@ static void bake_floor(double scale, const double offset[3], picture *p) {
         assert_int_equal(stats.invalid, 0);
         assert_int_equal(stats.unfinished, 0);
     }
-    caster_free(&c);
 }
 
 /* Estimators differ by less than `rms` and `worst`, rays by `rays` rms. Values of `hard` are
  * 0 or 1, so a texel on an edge may change by 1: one of 4096 gives an rms of 0.0156, and one ray of 64 gives
  * 2.4e-4. */
-static void assert_alike(const char *where, double at, const picture *a, const picture *b, double rms,
-                         double worst, double rays) {
+static void assert_alike(const picture *a, const picture *b, double rms, double worst, double rays) {
     for (int kind = 0; kind < KINDS; ++kind) {
         const truth_metrics m = truth_compare(COUNT, a->v[kind], b->v[kind], NULL);
-        print_message("%s %g, %s: rms %.2g, worst %.2g\n", where, at, name_of(kind), m.rmse, m.max);
         assert_true(m.rmse < (kind == VSH_SHADOW_HARD ? 0.016 : by_rays(kind) ? rays : rms));
         assert_true(kind == VSH_SHADOW_HARD || by_rays(kind) || m.max < worst);
     }
@@ -63,7 +60,7 @@ TEST(voxels_from_1e_12_to_1e12_give_the_same_picture) {
     const double voxels[] = {1e-12, 1e-9, 1e-6, 1.4e-5, 1.6e-5, 1e-3, 1e3, 1e6, 1e9, 1e12};
     for (size_t v = 0; v < sizeof voxels / sizeof voxels[0]; ++v) {
         bake_floor(voxels[v] / 0.04 * (1.0 + 1e-9 * (v == 0) - 1e-9 * (v == 9)), NOWHERE, &there);
-        assert_alike("voxel", voxels[v], &there, &middle, 1e-5, 1e-3, 2e-3);
+        assert_alike(&there, &middle, 1e-5, 1e-3, 2e-3);
     }
 }
 
@@ -93,7 +90,7 @@ TEST(far_from_the_origin_the_picture_stays) {
             whole[axis] = 0.04 * round(offsets[o][axis] / 0.04);
         }
         bake_floor(1.0, whole, &there);
-        assert_alike("at", offsets[o][0], &there, &middle, 1e-4, 2e-3, 5e-3);
+        assert_alike(&there, &middle, 1e-4, 2e-3, 5e-3);
     }
 }
 
@@ -151,8 +148,6 @@ TEST(half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth
             const truth_metrics m = truth_compare(COUNT, p->v[kind], truth[is_ao(kind)], outside);
             const truth_metrics same = truth_compare(COUNT, at_6.v[kind], truth[is_ao(kind)], outside);
             const truth_metrics apart = truth_compare(COUNT, p->v[kind], at_6.v[kind], outside);
-            print_message("half width %g, %s: rmse %.4f, rms %.2g from that of 6\n", half_widths[h],
-                          name_of(kind), m.rmse, apart.rmse);
             /* as at 6, or a tenth of a penumbra's step worse at 3 and 4, whose coarse levels hold less */
             assert_true(m.rmse <= same.rmse + 0.004);
             assert_true(kind != VSH_SHADOW_CONE || m.rmse < 0.032);
@@ -171,7 +166,7 @@ TEST(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say) {
     const truth_solid solids[2] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {2.0, 0.5, 2.0}, 0.0, 0.0},
                                    {TRUTH_BOX, {-1.5, 1.0, 0.0}, {0.5, 1.0, 2.0}, 0.0, 0.0}};
     const truth_scene scene = {solids, 2};
-    casting c = caster_of(scene, 0.04, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(scene, 0.04, 0.0);
     const double distances[] = {0x1p-1000, 1e-300, 1e-12, 1e-3, 0.01,  0.04,
                                 4.0,       40.0,   1e6,   1e12, 1e300, 0x1p1000};
     enum { PLACES = 24 };
@@ -200,14 +195,11 @@ TEST(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say) {
                     assert_int_equal(bits_of(v[i]), bits_of(all[i]));
                 }
             }
-            print_message("%s within %g: %.3f from all of the sky\n", name_of(SHADOWS + method), distances[d],
-                          worst);
             /* 3 of the standard errors that were asked for; cones see a wall as its edges are smoothed */
             assert_true(distances[d] < 1.0 || method == VSH_AO_TAPS ||
                         worst < (method == VSH_AO_CONES ? 0.08 : 0.06));
         }
     }
-    caster_free(&c);
 }
 
 /* A bar of 30 000 voxels, and a ray along it so near to its face that each step is the least one, a quarter
@@ -215,7 +207,7 @@ TEST(ao_distances_below_a_voxel_and_above_the_scene_are_what_they_say) {
 TEST(a_hundred_thousand_least_steps_lose_nothing) {
     const double length = 30000.0;
     const truth_solid bar = {TRUTH_BOX, {0.0, -4.0, 0.0}, {0.5 * length, 4.0, 4.0}, 0.0, 0.0};
-    vsh_field *field = field_of((truth_scene){&bar, 1}, 1.0, 8.0);
+    OWNED(vsh_field) *field = field_of((truth_scene){&bar, 1}, 1.0, 8.0);
     const double heights[] = {0.01, 0.1, 0.24};
     for (int i = 0; i < 3; ++i) {
         /* the kernel itself: its callers allow 65536 steps */
@@ -235,8 +227,6 @@ TEST(a_hundred_thousand_least_steps_lose_nothing) {
         vshi_march_stats stats = {0, 0};
         vshi_kernel_of(VSH_ISA_BEST)->march(field, &rays, VSHI_MARCH_PLAIN, 1 << 20, &stats);
         const double expected = heights[i] / (length - 200.0);
-        print_message("height %g: %llu samples, closeness off by %.2g of it\n", heights[i],
-                      (unsigned long long)stats.samples, fabs((double)lane[10] / expected - 1.0));
         assert_true(stats.samples > 100000);
         assert_int_equal(stats.unfinished, 0);
         assert_true(fabs((double)lane[10] / expected - 1.0) < 1e-3);
@@ -256,9 +246,4 @@ TEST(a_hundred_thousand_least_steps_lose_nothing) {
     assert_true(v == 1.0f);
     assert_int_equal(stats.unfinished, 1);
     assert_int_equal(stats.samples, 65536);
-    vsh_field_free(field);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -2,10 +2,7 @@
 #include "mesh/mesh.h"
 #include "testing.h"
 
-#include <stdlib.h>
-#include <string.h>
 #include <time.h>
-#include <vdbshade/heights.h>
 
 /* The unit cube, anticlockwise from outside: corner i is at (i & 1, i >> 1 & 1, i >> 2). The last two
  * triangles are its top (z = 1). */
@@ -126,7 +123,6 @@ TEST(cubes_have_the_edges_area_and_bounds_that_they_have) {
                                .vertex_count = s.vertices,
                                .triangle_count = s.triangles};
         const vsh_mesh_report report = check(&mesh);
-        print_message("%s\n", cases[i].name);
         assert_int_equal(report.open_edges, cases[i].open_edges);
         assert_int_equal(report.flipped_edges, cases[i].flipped_edges);
         assert_int_equal(report.degenerate_triangles, cases[i].degenerate_triangles);
@@ -195,9 +191,8 @@ static void refused(const vsh_mesh *mesh, vsh_result code, const char *part, con
     assert_int_equal(vsh_mesh_check(mesh, &report, &failure), code);
     assert_int_equal(failure.code, code);
     assert_int_equal(report.open_edges, 77);
-    if (strstr(failure.message, part) == NULL || strstr(failure.message, other) == NULL) {
-        fail_msg("'%s' does not name %s and %s", failure.message, part, other);
-    }
+    assert_that(strstr(failure.message, part) != NULL && strstr(failure.message, other) != NULL,
+                "'%s' does not name %s and %s", failure.message, part, other);
 }
 
 TEST(bad_vertices_indices_and_transforms_are_refused_by_number) {
@@ -263,10 +258,10 @@ TEST(labels_say_name_or_number_and_keep_whole_characters) {
 /* A closed box: a flat heightfield of n × n cells, as a solid. */
 TEST(a_million_triangles_take_about_a_second) {
     enum { N = 710, SIDE = N + 1 };
-    float *heights = calloc(SIDE * SIDE, sizeof *heights);
+    FREED float *heights = calloc(SIDE * SIDE, sizeof *heights);
     const vsh_heights_source source = {
         .columns = SIDE, .rows = SIDE, .values = heights, .size = {N, N}, .height = 1, .base = 1};
-    vsh_model *model = NULL;
+    OWNED(vsh_model) *model = NULL;
     assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     const clock_t start = clock();
@@ -276,10 +271,7 @@ TEST(a_million_triangles_take_about_a_second) {
     assert_int_equal(report.open_edges, 0);
     assert_int_equal(report.flipped_edges, 0);
     assert_near(report.area, 2.0 * N * N + 4.0 * N, 1e-6);
-    print_message("%zu triangles: %.3f s\n", mesh.triangle_count, seconds);
     assert_true(seconds < 10.0); /* 0.12 s measured; sanitizers and busy machines take longer */
-    vsh_model_free(model);
-    free(heights);
 }
 
 TEST(names_match_patterns_as_in_a_shell) {
@@ -320,9 +312,8 @@ TEST(names_match_patterns_as_in_a_shell) {
     };
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
         const vsh_mesh mesh = {.name = cases[i].name};
-        if (vsh_mesh_matches(&mesh, cases[i].pattern) != cases[i].match) {
-            fail_msg("'%s' by '%s': expected %d", cases[i].name, cases[i].pattern, cases[i].match);
-        }
+        assert_that(vsh_mesh_matches(&mesh, cases[i].pattern) == cases[i].match, "'%s' by '%s': expected %d",
+                    cases[i].name, cases[i].pattern, cases[i].match);
     }
     const vsh_mesh part = {.name = "Wall/Cube.003", .object_name = "Wall"};
     assert_true(vsh_mesh_matches(&part, "Wall") && vsh_mesh_matches(&part, "Cube.*"));
@@ -344,8 +335,4 @@ TEST(a_pattern_of_many_stars_takes_no_time) {
     strcpy(pattern + 2000, "b");
     const vsh_mesh mesh = {.name = name};
     assert_false(vsh_mesh_matches(&mesh, pattern));
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

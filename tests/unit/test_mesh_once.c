@@ -5,8 +5,6 @@
 
 #include "mesh/mesh.h"
 
-#include <vdbshade/bake_scene.h>
-
 static int validated, looked_over, welded, edges_counted;
 
 vsh_result __real_vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error);
@@ -74,22 +72,18 @@ static void bake(const char *method) {
     write_text("box.obj", box);
     write_text("floor.obj", floor_of_two);
     write_text("scene.json", scene_text);
-    vsh_scene *scene = NULL;
+    OWNED(vsh_scene) *scene = NULL;
     assert_ok(vsh_scene_read(at("scene.json"), NULL, &scene, &failure));
     validated = looked_over = welded = edges_counted = 0;
     assert_ok(vsh_bake_scene(scene, NULL, NULL, NULL, &failure));
-    vsh_scene_free(scene);
     assert_int_equal(looked_over, MESHES);
     assert_int_equal(welded, MESHES);
     assert_int_equal(edges_counted, 0); /* what nobody reads */
     assert_int_equal(validated, MESHES);
 }
 
-TEST(a_bake_checks_and_welds_each_mesh_once) {
+TEST(a_bake_that_marches_or_traces_checks_and_welds_each_mesh_once) {
     bake("adaptive");
-}
-
-TEST(so_does_one_that_traces_triangles) {
     bake("exact");
 }
 
@@ -102,14 +96,11 @@ TEST(occluders_of_arrays_are_checked_and_welded_once) {
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = 16;
     validated = looked_over = welded = 0;
-    vsh_occluders *occluders = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
     assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &occluders, &failure));
-    vsh_occluders_free(occluders);
     assert_int_equal(validated, 1);
     assert_int_equal(looked_over, 1);
     assert_int_equal(welded, 1);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

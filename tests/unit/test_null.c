@@ -2,18 +2,14 @@
  * place of a handle. */
 #include "testing.h"
 
-#include <vdbshade/vdbshade.h>
-
 enum { SIDE = 4, COUNT = SIDE * SIDE };
 
 static vsh_error error;
 static void *made;
 
 static void expect_refused(const char *call, vsh_result result) {
-    if (result != VSH_ERROR_ARGUMENT || error.message[0] == '\0' || made != NULL) {
-        fail_msg("%s: %s%s", call, vsh_result_name(result),
-                 made != NULL ? ", and its place is as it was" : "");
-    }
+    assert_that(result == VSH_ERROR_ARGUMENT && error.message[0] != '\0' && made == NULL, "%s: %s%s", call,
+                vsh_result_name(result), made != NULL ? ", and its place is as it was" : "");
     error.message[0] = '\0';
 }
 
@@ -176,7 +172,7 @@ static vsh_occluders *no_casters(void) {
 }
 
 TEST(nothing_is_shaded_without_what_it_takes) {
-    vsh_occluders *casters = no_casters();
+    OWNED(vsh_occluders) *casters = no_casters();
     const vsh_light light = vsh_light_default();
     const double positions[3] = {0, 0, 0};
     const float normals[3] = {0, 1, 0};
@@ -217,13 +213,12 @@ TEST(nothing_is_shaded_without_what_it_takes) {
     vsh_query_free(query);
     REFUSED(vsh_trace_shadow(NULL, NULL, 1, positions, normals, 0.0, &light, 1, NULL, &value, &error));
     REFUSED(vsh_trace_ao(NULL, NULL, 1, positions, normals, 0.0, 1.0, 1, NULL, &value, &error));
-    vsh_occluders_free(casters);
 }
 
 TEST(nothing_is_baked_without_what_it_takes) {
-    vsh_occluders *casters = no_casters();
-    vsh_voxels *voxels = NULL;
-    vsh_volume *volume = NULL;
+    OWNED(vsh_occluders) *casters = no_casters();
+    OWNED(vsh_voxels) *voxels = NULL;
+    OWNED(vsh_volume) *volume = NULL;
     const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
     const int32_t index[3] = {0, 0, 0}, size[3] = {1, 1, 1};
     const vsh_light light = vsh_light_default();
@@ -268,13 +263,10 @@ TEST(nothing_is_baked_without_what_it_takes) {
     REFUSED(vsh_volume_copy(volume, 0, NULL, size, values, &error));
     REFUSED(vsh_volume_copy(volume, 0, index, NULL, values, &error));
     REFUSED(vsh_volume_copy(volume, 0, index, size, NULL, &error));
-    vsh_volume_free(volume);
-    vsh_voxels_free(voxels);
-    vsh_occluders_free(casters);
 }
 
 TEST(nothing_is_drawn_or_compared_without_what_it_takes) {
-    vsh_occluders *casters = no_casters();
+    OWNED(vsh_occluders) *casters = no_casters();
     const vsh_surface nothing = {NULL, {0.5, 0.5, 0.5}};
     const vsh_light light = vsh_light_default();
     vsh_render_options options = vsh_render_options_default();
@@ -325,9 +317,4 @@ TEST(nothing_is_drawn_or_compared_without_what_it_takes) {
     assert_null(vsh_comparison_channel(NULL, 0));
     assert_null(vsh_comparison_problem(NULL, 0));
     vsh_comparison_free(NULL);
-    vsh_occluders_free(casters);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

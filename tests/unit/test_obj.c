@@ -2,21 +2,18 @@
 #include "models.h"
 #include "testing.h"
 
-#include <math.h>
-
 static const char corners[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
 /* "name object triangles vertices;" of each mesh. */
 static void assert_parts(const char *text, const char *expected) {
     char parts[1024] = "";
-    vsh_model *model = read_text("parts.obj", text);
+    OWNED(vsh_model) *model = read_text("parts.obj", text);
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
         const vsh_mesh mesh = vsh_model_mesh(model, i, 0);
         const size_t used = strlen(parts);
         snprintf(parts + used, sizeof parts - used, "%s %u %zu %zu;", mesh.name, mesh.object,
                  mesh.triangle_count, mesh.vertex_count);
     }
-    vsh_model_free(model);
     assert_string_equal(parts, expected);
 }
 
@@ -41,19 +38,18 @@ TEST(corners_that_agree_in_all_share_a_vertex) {
     snprintf(text, sizeof text,
              "%svt 0 0\nvt 1 1\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\nf 1/1/1 3/2/1 4/1/1\nf -4/-2/-1 3/2/1 4//1\n",
              corners);
-    vsh_model *model = read_text("shared.obj", text);
+    OWNED(vsh_model) *model = read_text("shared.obj", text);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
     static const uint32_t indices[9] = {0, 1, 2, 0, 3, 4, 0, 3, 5};
     assert_int_equal(mesh.vertex_count, 6);
     assert_memory_equal(mesh.indices, indices, sizeof indices);
     static const float uvs[12] = {0, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0};
     assert_memory_equal(mesh.uvs, uvs, sizeof uvs);
-    vsh_model_free(model);
 }
 
 /* What other programs write, and what Assimp 5.2 did not read. */
 TEST(unusual_statements_are_read) {
-    vsh_model *model =
+    OWNED(vsh_model) *model =
         read_text("odd.obj", "\xef\xbb\xbfv 0 0 0 1 1 1 1\r# lone ends of lines\r  v 4 0 0 2\r"
                              "v 1e0 +1. 0 # a corner\rvt .5\rvp 1 2\rf 1/1/ \\\r2/1 3/1 # all\r"
                              "f 1/1 2/1\r");
@@ -62,13 +58,13 @@ TEST(unusual_statements_are_read) {
     assert_int_equal(mesh.triangle_count, 1);
     assert_memory_equal(mesh.positions, positions, sizeof positions);
     assert_memory_equal(mesh.uvs, uvs, sizeof uvs);
-    vsh_model_free(model);
 }
 
 /* A long strip of triangles, with a very long line and lines that go on. */
 TEST(files_and_lines_of_any_length_are_read) {
     enum { COUNT = 60000, LONG = 700000 };
-    char *text = malloc(COUNT * 64 + 2 * LONG), *to = text;
+    FREED char *text = malloc(COUNT * 64 + 2 * LONG);
+    char *to = text;
     assert_non_null(text);
     for (int i = 0; i < COUNT; ++i) {
         to += sprintf(to, "v %d %d.25 -%d\n", i, i % 2, i % 7);
@@ -82,26 +78,23 @@ TEST(files_and_lines_of_any_length_are_read) {
             to += LONG + 1;
         }
     }
-    vsh_model *model = read_good("long.obj", text, (size_t)(to - text));
+    OWNED(vsh_model) *model = read_good("long.obj", text, (size_t)(to - text));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, 0);
     assert_int_equal(mesh.triangle_count, COUNT - 2);
     for (size_t t = 0; t < COUNT - 2; ++t) {
         for (size_t k = 0; k < 3; ++k) {
             const size_t v = t + 2 - k;
             const float *p = mesh.positions + 3 * (size_t)mesh.indices[3 * t + k];
-            if (p[0] != (float)v || p[1] != (float)(v % 2) + 0.25F || p[2] != -(float)(v % 7)) {
-                fail_msg("triangle %zu: (%g, %g, %g)", t, (double)p[0], (double)p[1], (double)p[2]);
-            }
+            assert_that(p[0] == (float)v && p[1] == (float)(v % 2) + 0.25F && p[2] == -(float)(v % 7),
+                        "triangle %zu: (%g, %g, %g)", t, (double)p[0], (double)p[1], (double)p[2]);
         }
     }
-    vsh_model_free(model);
     to += sprintf(to, "f 1 2 x\n");
     vsh_model *none = NULL;
     assert_fails(read_bytes("long.obj", text, (size_t)(to - text), &none, &failure), VSH_ERROR_INPUT, "");
     char line[32];
     snprintf(line, sizeof line, "line %d:", COUNT + COUNT - 2 + (COUNT - 2) / 3 + 2);
     assert_non_null(strstr(failure.message, line));
-    free(text);
 }
 
 TEST(hostile_statements_are_refused_and_name_their_line) {
@@ -127,16 +120,15 @@ TEST(hostile_statements_are_refused_and_name_their_line) {
 /* A place with very many normals, as a cone's tip may have. */
 TEST(a_place_with_many_vertices_takes_no_longer) {
     enum { COUNT = 100000 };
-    char *text = malloc(COUNT * 64), *to = text;
+    FREED char *text = malloc(COUNT * 64);
+    char *to = text;
     assert_non_null(text);
     to += sprintf(to, "%s", corners);
     for (int i = 1; i <= COUNT; ++i) {
         to += sprintf(to, "vn 0 0 %d\nf 1//%d 2 3\n", i, i);
     }
-    vsh_model *model = read_good("tip.obj", text, (size_t)(to - text));
+    OWNED(vsh_model) *model = read_good("tip.obj", text, (size_t)(to - text));
     assert_int_equal(vsh_model_mesh(model, 0, 0).vertex_count, COUNT + 2);
-    vsh_model_free(model);
-    free(text);
 }
 
 TEST(materials_beside_the_file_say_what_is_blended) {
@@ -149,7 +141,7 @@ TEST(materials_beside_the_file_say_what_is_blended) {
         char text[512];
         snprintf(text, sizeof text, "mtllib %s\n%susemtl %s\nf 1 2 3\n", i % 2 == 0 ? "own.mtl" : "gone.mtl",
                  corners, names[i]);
-        vsh_model *model =
+        OWNED(vsh_model) *model =
             read_text("own.obj", text); /* whose own materials are read where the others are not */
         assert_int_equal(vsh_model_mesh(model, 0, 0).alpha,
                          blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);
@@ -159,7 +151,6 @@ TEST(materials_beside_the_file_say_what_is_blended) {
         assert_string_equal(told.name, names[i]);
         assert_int_equal(told.alpha, blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);
         assert_string_equal(vsh_model_mesh(model, 0, 0).material_name, names[i]);
-        vsh_model_free(model);
     }
     write_bytes("own.mtl", "newmtl a\nd x\n", 13);
     vsh_model *none = NULL;
@@ -171,25 +162,22 @@ TEST(materials_beside_the_file_say_what_is_blended) {
 /* What a small file can make of itself is held against the limit first. */
 TEST(memory_is_held_against_the_limit) {
     enum { COUNT = 50000 };
-    char *text = malloc(COUNT * 8 + sizeof corners), *to = text;
+    FREED char *text = malloc(COUNT * 8 + sizeof corners);
+    char *to = text;
     assert_non_null(text);
     to += sprintf(to, "%s", corners);
     for (int i = 0; i < COUNT; ++i) {
         to += sprintf(to, "f 1 2 3\n");
     }
     write_bytes("limit.obj", text, (size_t)(to - text));
-    free(text);
     vsh_run run = vsh_run_default();
-    vsh_model *model = NULL;
+    OWNED(vsh_model) *model = NULL;
     run.memory_limit = 1000000;
     assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
     assert_null(model);
     run.memory_limit = 3000000;
     assert_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
-    vsh_model_free(model);
     assert_int_equal(unlink(path_of("limit.obj").text), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

@@ -4,8 +4,6 @@
 #include "shading.h"
 #include "testing.h"
 
-#include <vdbshade/vdbshade.h>
-
 /* A square plate of 2 × 2 at y = 1, and of 0.2 thick. */
 static vsh_mesh plate(void) {
     static const float positions[] = {-1, 1,    -1, 1, 1,    -1, 1, 1,    1, -1, 1,    1,
@@ -20,11 +18,11 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = 64;
     options.reach = 2.0;
-    vsh_occluders *made = NULL;
+    OWNED(vsh_occluders) *made = NULL, *bare = NULL;
     assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
     vsh_grid *grid = NULL;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &failure));
-    vsh_field *field = field_of_grid(grid, options.reach);
+    OWNED(vsh_field) *field = field_of_grid(grid, options.reach);
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(made, &parts);
     assert_int_equal(parts.struct_size, sizeof parts);
@@ -46,22 +44,18 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     assert_true(info.voxel_size == of_field.voxel_size && info.levels == of_field.levels);
     assert_true(info.grid_bytes > 0 && info.voxelize_s > 0.0 && info.field_s > 0.0);
     assert_true(info.has_triangles);
-    vsh_field_free(field);
-    vsh_occluders_free(made);
 
     options.triangles = 0;
-    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
-    vsh_occluders_get_info(made, &info);
+    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &bare, &failure));
+    vsh_occluders_get_info(bare, &info);
     assert_true(info.has_triangles == 0 && info.triangles_bytes == 0);
-    vsh_occluders_free(made);
 }
 
 TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
     vsh_occluders_options options = vsh_occluders_options_default(), coarse = options, behind = options;
     coarse.grid.resolution = 1;
     behind.reach = -1.0;
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1000;
+    vsh_run run = run_within(1000);
     const struct {
         size_t vertex_count, count;
         const vsh_occluders_options *options;
@@ -91,7 +85,7 @@ static void expect_refused(const vsh_occluder_parts *parts, const char *text) {
 
 TEST(parts_that_are_none_are_refused_by_name) {
     const double ball[] = {0, 0, 0, 1};
-    vsh_spheres *spheres = NULL;
+    OWNED(vsh_spheres) *spheres = NULL;
     assert_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
     vsh_occluder_parts parts = vsh_occluder_parts_default();
     expect_refused(&parts, "neither a field nor triangles nor layers");
@@ -110,15 +104,14 @@ TEST(parts_that_are_none_are_refused_by_name) {
     layers[1].spheres = spheres;
     layers[1].softness = 2000;
     expect_refused(&parts, "layer 1: softness 2000");
-    vsh_spheres_free(spheres);
 }
 
 TEST(layers_alone_say_what_offsets_are_measured_in) {
     const double ball[] = {0, 0, 0, 1};
-    vsh_spheres *spheres = NULL;
+    OWNED(vsh_spheres) *spheres = NULL;
     assert_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
     const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
-    vsh_field *field = field_of((truth_scene){&solid, 1}, 0.125, 1.0);
+    OWNED(vsh_field) *field = field_of((truth_scene){&solid, 1}, 0.125, 1.0);
     vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
     layers[0].spheres = spheres;
     layers[1].field = field;
@@ -131,7 +124,7 @@ TEST(layers_alone_say_what_offsets_are_measured_in) {
         parts.layers = layers;
         parts.layer_count = cases[i].layers;
         parts.voxel_size = cases[i].given;
-        vsh_occluders *made = NULL;
+        OWNED(vsh_occluders) *made = NULL;
         assert_ok(vsh_occluders_from_parts(&parts, &made, &failure));
         vsh_occluder_parts views;
         vsh_occluders_get_parts(made, &views);
@@ -143,10 +136,7 @@ TEST(layers_alone_say_what_offsets_are_measured_in) {
         vsh_occluders_get_info(made, &counted);
         assert_true((counted.field_bytes > 0) == (cases[i].layers == 2));
         assert_true(counted.voxel_size == (cases[i].layers == 2 ? 0.125 : 0.0));
-        vsh_occluders_free(made);
     }
-    vsh_field_free(field);
-    vsh_spheres_free(spheres);
 }
 
 TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
@@ -154,7 +144,7 @@ TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
     vsh_grid *grid = grid_of((truth_scene){&solid, 1}, 0.125);
     vsh_field_options options = vsh_field_options_default();
     options.reach = -1.0;
-    vsh_occluders *made = (vsh_occluders *)&failure;
+    OWNED(vsh_occluders) *made = (vsh_occluders *)&failure;
     assert_fails(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(made);
     options.reach = 3.0;
@@ -162,13 +152,11 @@ TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
     vsh_occluder_parts parts;
     vsh_occluders_get_parts(made, &parts);
     assert_true(parts.triangles == NULL && parts.layer_count == 0);
-    vsh_field *field = field_of_grid(grid, 3.0);
+    OWNED(vsh_field) *field = field_of_grid(grid, 3.0);
     vsh_field_info ours, theirs;
     vsh_field_get_info(parts.field, &ours);
     vsh_field_get_info(field, &theirs);
     assert_memory_equal(&ours, &theirs, sizeof ours);
-    vsh_field_free(field);
-    vsh_occluders_free(made);
 }
 
 /* A point under the plate, half in its shadow. */
@@ -192,7 +180,7 @@ TEST(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not) {
         vsh_occluders_options options = vsh_occluders_options_default();
         options.grid.resolution = 16;
         options.triangles = kept;
-        vsh_occluders *made = NULL;
+        OWNED(vsh_occluders) *made = NULL;
         assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
         const int32_t method = kept ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
         const float lit = lit_under(made, VSH_SHADOW_AUTO, VSH_OK);
@@ -202,14 +190,13 @@ TEST(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not) {
             lit_under(made, VSH_SHADOW_EXACT, VSH_ERROR_ARGUMENT);
             assert_non_null(strstr(failure.message, "the occluders have no triangles"));
         }
-        vsh_occluders_free(made);
     }
 }
 
 static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_options *options,
                                vsh_result expected) {
-    vsh_scene *scene = parse("/scene.json", text);
-    vsh_assets *assets = NULL;
+    OWNED(vsh_scene) *scene = parse("/scene.json", text);
+    OWNED(vsh_assets) *assets = NULL;
     vsh_occluders *made = NULL;
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     assert_int_equal(vsh_scene_occluders(scene, assets, options, NULL, &made, &failure), expected);
@@ -217,8 +204,6 @@ static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_optio
     if (made != NULL) { /* no layer of these scenes refers to scene or assets */
         vsh_occluders_get_info(made, &info);
     }
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
     return made;
 }
 
@@ -238,13 +223,12 @@ TEST(a_scene_keeps_the_truth_only_where_an_error_is_kept) {
                  {SCENE(BALL, "\"method\": \"cone\""), 1, false}};
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         options.truth = cases[i].truth;
-        vsh_occluders *made = of_scene(cases[i].text, &options, VSH_OK);
+        OWNED(vsh_occluders) *made = of_scene(cases[i].text, &options, VSH_OK);
         vsh_occluder_parts parts;
         vsh_occluders_get_parts(made, &parts);
         assert_int_equal(parts.true_solids != NULL, cases[i].kept);
         assert_null(parts.true_triangles);
         assert_null(parts.triangles);
-        vsh_occluders_free(made);
     }
     options.receivers_min = (const double[]){0, 0, 0}; /* a box without its other half */
     assert_null(of_scene(cases[2].text, &options, VSH_ERROR_ARGUMENT));
@@ -267,13 +251,11 @@ TEST(more_layers_than_can_be_are_refused) {
     scene.shade.method = VSH_SHADOW_HARD;
     for (size_t more = 0; more < 2; ++more) {
         scene.caster_count = VSH_MAX_LAYERS + more;
-        vsh_assets *assets = NULL;
-        vsh_occluders *made = NULL;
+        OWNED(vsh_assets) *assets = NULL;
+        OWNED(vsh_occluders) *made = NULL;
         assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
         const vsh_result result = vsh_scene_occluders(&scene, assets, NULL, NULL, &made, &failure);
         assert_int_equal(result, more ? VSH_ERROR_INPUT : VSH_OK);
-        vsh_occluders_free(made);
-        vsh_assets_free(assets);
     }
     assert_string_equal(failure.message,
                         "0 layers and 129 casters that are not voxelised: at most 128 together");
@@ -334,7 +316,7 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
                        .grid = vsh_grid_options_default(),
                        .shade = vsh_shade_options_default()};
     scene.grid.resolution = 32;
-    vsh_assets *assets = NULL;
+    OWNED(vsh_assets) *assets = NULL;
     assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
     for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
         int told = 0;
@@ -344,14 +326,8 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
         scene.shade.method = cases[i].method;
         vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
         options.silent_voxels = cases[i].silent;
-        vsh_occluders *made = NULL;
+        OWNED(vsh_occluders) *made = NULL;
         assert_ok(vsh_scene_occluders(&scene, assets, &options, &run, &made, &failure));
         assert_int_equal(told > 0, cases[i].told);
-        vsh_occluders_free(made);
     }
-    vsh_assets_free(assets);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

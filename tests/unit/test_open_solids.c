@@ -15,10 +15,8 @@ static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t
     for (size_t i = 0; i < count; ++i) {
         uint8_t where;
         vshi_inside(triangles, 1, at[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);
-        if ((where == VSHI_INSIDE) != hidden) {
-            fail_msg("%s: point (%g, %g, %g) is %s", mesh->name, at[i][0], at[i][1], at[i][2],
-                     hidden ? "not hidden" : "hidden");
-        }
+        assert_that((where == VSHI_INSIDE) == hidden, "%s: point (%g, %g, %g) is %s", mesh->name, at[i][0],
+                    at[i][1], at[i][2], hidden ? "not hidden" : "hidden");
     }
 }
 
@@ -116,8 +114,4 @@ TEST(sheets_by_name_hide_nothing) {
     for (size_t i = 0; i < mesh.triangle_count; ++i) {
         assert_int_equal(holed[i], VSHI_SIDE_SHEET);
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

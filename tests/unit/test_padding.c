@@ -1,10 +1,7 @@
 /* Padding: texels outside the charts take their nearest neighbour's value. */
-#include <stdlib.h>
-#include <string.h>
 
 #include "bake/padding.h"
 #include "testing.h"
-#include <stdbool.h>
 
 static const float HOLE = -7.0f; /* what an unfilled texel holds; no valid texel does */
 
@@ -38,8 +35,8 @@ TEST(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones) {
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         const int32_t width = sizes[s][0], height = sizes[s][1];
         const size_t count = (size_t)width * (size_t)height;
-        uint8_t *states = malloc(count);
-        float *values = malloc(count * sizeof *values);
+        FREED uint8_t *states = malloc(count);
+        FREED float *values = malloc(count * sizeof *values);
         for (size_t r = 0; r < sizeof radii / sizeof radii[0]; ++r) {
             for (size_t i = 0; i < count; ++i) {
                 random = random * 1664525u + 1013904223u;
@@ -56,8 +53,6 @@ TEST(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones) {
                 assert_true(values[i] == (source < 0 ? HOLE : (float)source));
             }
         }
-        free(values);
-        free(states);
     }
 }
 
@@ -104,8 +99,7 @@ TEST(any_number_of_threads_gives_the_same_bits) {
             states[i] = i * 2654435761u >> 26 == 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_EMPTY;
             values[t][i] = (float)i;
         }
-        vsh_run run = vsh_run_default();
-        run.threads = threads[t];
+        vsh_run run = run_on(threads[t]);
         fill(&run, WIDTH, HEIGHT, states, 9, 0, values[t], 1);
         assert_memory_equal(values[0], values[t], sizeof values[0]);
     }
@@ -195,8 +189,4 @@ TEST(values_are_copied_from_texels_that_have_one) {
     assert_memory_equal(values, AFTER, sizeof values);
     assert_int_equal(states[1], VSHI_TEXEL_FILLED);
     assert_int_equal(states[2], VSHI_TEXEL_INVALID);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

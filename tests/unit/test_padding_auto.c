@@ -1,8 +1,4 @@
 /* Padding for mip levels: every texel holds a value, and levels hold the means of values alone. */
-#include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "bake/padding.h"
 #include "lightmaps.h"
@@ -36,9 +32,9 @@ TEST(every_level_holds_the_means_of_values_alone) {
     const int32_t sizes[][2] = {{64, 64}, {1, 1}, {37, 90}, {128, 16}, {1, 77}, {255, 3}};
     for (size_t s = 0; s < sizeof sizes / sizeof sizes[0]; ++s) {
         size_t width = (size_t)sizes[s][0], height = (size_t)sizes[s][1], count = width * height;
-        uint8_t *mask = calloc(count, 1), *means_mask = calloc(count, 1), *next_mask = calloc(count, 1);
-        float *filled = malloc(3 * count * sizeof *filled), *means = malloc(3 * count * sizeof *means);
-        float *next = malloc(3 * count * sizeof *next), *given = malloc(3 * count * sizeof *given);
+        FREED uint8_t *mask = calloc(count, 1), *means_mask = calloc(count, 1), *next_mask = calloc(count, 1);
+        FREED float *filled = malloc(3 * count * sizeof *filled), *means = malloc(3 * count * sizeof *means);
+        FREED float *next = malloc(3 * count * sizeof *next), *given = malloc(3 * count * sizeof *given);
         uint32_t random = 99;
         for (size_t i = 0; i < 3 * count; ++i) {
             random = random * 1664525u + 1013904223u;
@@ -69,13 +65,6 @@ TEST(every_level_holds_the_means_of_values_alone) {
                 assert_true(means_mask[i / 3] == 0 || fabsf(filled[i] - means[i]) < 1e-5f);
             }
         }
-        free(given);
-        free(next);
-        free(means);
-        free(filled);
-        free(next_mask);
-        free(means_mask);
-        free(mask);
     }
 }
 
@@ -116,10 +105,10 @@ static vsh_charts *charts_with(const vsh_mesh *mesh, int32_t padding) {
 TEST(a_lightmap_is_filled_to_its_last_corner) {
     float uvs[8];
     const vsh_mesh mesh = corner_mesh(uvs);
-    vsh_charts *charts = charts_with(&mesh, VSH_PADDING_AUTO), *grown = charts_with(&mesh, 16);
-    vsh_field *field = floor_field(0);
+    OWNED(vsh_charts) *charts = charts_with(&mesh, VSH_PADDING_AUTO), *grown = charts_with(&mesh, 16);
+    OWNED(vsh_field) *field = floor_field(0);
     const vsh_light light = sun(0.3, 1.0, 0.2, 0.14);
-    planes *all = new_planes(), *other = new_planes();
+    FREED planes *all = new_planes(), *other = new_planes();
     bake(field, charts, &light, &all->all, NULL, 1);
     bake(field, grown, &light, &other->all, NULL, 1);
     size_t beyond = 0;
@@ -139,11 +128,6 @@ TEST(a_lightmap_is_filled_to_its_last_corner) {
         assert_memory_equal(all->shadow, other->shadow, sizeof all->shadow);
         assert_memory_equal(all->irradiance, other->irradiance, sizeof all->irradiance);
     }
-    free(other);
-    free(all);
-    vsh_field_free(field);
-    vsh_charts_free(grown);
-    vsh_charts_free(charts);
 }
 
 TEST(no_other_padding_is_below_0) {
@@ -153,8 +137,4 @@ TEST(no_other_padding_is_below_0) {
     options.padding = -2;
     assert_fails(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, &failure), VSH_ERROR_ARGUMENT,
                  "padding -2");
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -240,7 +240,6 @@ static void try_values(const char *path, const char *place, bake_case *one) {
         }
         free(bad.at);
     }
-    print_message("%zu of %zu tries were refused by range\n", refused, words / step);
     assert_true(refused >= words / step / 20);
     write_file(path, &good);
     free(good.at);
@@ -256,6 +255,4 @@ TEST(values_out_of_range_are_refused_by_part_plane_and_texel) {
     free(one.rows);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

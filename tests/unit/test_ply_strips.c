@@ -2,8 +2,6 @@
 #include "models.h"
 #include "testing.h"
 
-#include <vdbshade/scene.h>
-
 /* Six places over a plane, of which a strip is made: x, y of each. */
 static const float places[6][2] = {{0, 0}, {0, 1}, {1, 0}, {1, 1}, {2, 0}, {2, 1}};
 
@@ -128,13 +126,10 @@ TEST(a_limit_of_memory_holds_for_what_strips_unfold_to) {
         *to++ = (unsigned char)(i % 3);
     }
     write_bytes("c.ply", bytes, (size_t)(to - bytes));
-    vsh_run run = vsh_run_default();
-    run.memory_limit = 1000000;
+    vsh_run run = run_within(1000000);
     vsh_model *model = NULL;
     assert_fails(vsh_model_read(path_of("c.ply").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
     assert_int_equal(unlink(path_of("c.ply").text), 0);
 }
 
-int main(void) {
-    return run_all_tests(make_folder, remove_folder);
-}
+FIXTURE(make_folder, remove_folder)

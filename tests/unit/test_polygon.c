@@ -2,10 +2,6 @@
 #include "model/faces.h"
 #include "testing.h"
 
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
-
 enum { MOST = 4096 };
 
 typedef struct shape {
@@ -42,22 +38,18 @@ static size_t cut(const shape *s, bool expected_simple) {
     const bool simple = cutter.crossing == 0;
     vshi_face_cutter_end(&cutter, NULL, "", "");
     vshi_job_end(job);
-    if (simple != expected_simple) {
-        fail_msg("%zu corners are taken for %s", s->count, simple ? "simple" : "crossing");
-    }
+    assert_that(simple == expected_simple, "%zu corners are taken for %s", s->count,
+                simple ? "simple" : "crossing");
     assert_true(made <= s->count - 2);
     double sum = 0.0;
     const double whole = doubled_area(s, s->corner, s->count), sign = whole < 0.0 ? -1.0 : 1.0;
     for (size_t i = 0; i < made && simple && whole != 0.0; ++i) {
         const double area = sign * doubled_area(s, triangles + 3 * i, 3);
-        if (!(area > 0.0)) {
-            fail_msg("triangle %zu of %zu has the area %g", i, made, area);
-        }
+        assert_that(area > 0.0, "triangle %zu of %zu has the area %g", i, made, area);
         sum += area;
     }
-    if (simple && whole != 0.0 && !(fabs(sum - sign * whole) <= 1e-9 * sign * whole)) {
-        fail_msg("%zu corners: triangles of %.12g, polygon of %.12g", s->count, sum, sign * whole);
-    }
+    assert_that(!simple || whole == 0.0 || fabs(sum - sign * whole) <= 1e-9 * sign * whole,
+                "%zu corners: triangles of %.12g, polygon of %.12g", s->count, sum, sign * whole);
     return made;
 }
 
@@ -221,7 +213,6 @@ TEST(known_polygons_are_cut_into_as_many_triangles_as_they_should) {
                 memcpy(at[k], cases[i].at[(first + k) % count], sizeof at[k]);
             }
             set(&s, (const float(*)[2])at, count);
-            print_message("%s from corner %zu\n", cases[i].name, first);
             const size_t made = cut(&s, cases[i].made != NONE);
             if (cases[i].made != NONE) {
                 assert_int_equal(made, cases[i].made);
@@ -273,8 +264,4 @@ TEST(polygons_that_touch_themselves_do_no_harm) {
     assert_true(all > 1000 && cutter.crossing < all / 5);
     vshi_face_cutter_end(&cutter, NULL, "", "");
     vshi_job_end(job);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -4,8 +4,6 @@
 #include "testing.h"
 #include "traced.h"
 
-#include <vdbshade/query.h>
-
 #include <pthread.h>
 
 /* MANY: enough to be put in order. */
@@ -61,8 +59,7 @@ static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int
     output.deviation = deviation;
     output.ao = values[LIGHTS];
     output.ao_deviation = deviations[LIGHTS];
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
+    vsh_run run = run_on(threads);
     vsh_shade_stats stats = vsh_shade_stats_zero();
     assert_ok(vsh_query_points(query, points, NULL, &run, &output, &stats, &failure));
     return stats;
@@ -77,14 +74,14 @@ static void expect(const casting *c, const vsh_points *points, int l, const vsh_
 }
 
 TEST(values_and_deviations_are_those_of_the_shade_calls) {
-    casting c = caster_of(truth_seeds(), 0.04, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods = SHADOW_METHODS > AO_METHODS ? SHADOW_METHODS : AO_METHODS;
     for (int32_t method = 0; method < methods; ++method) {
         vsh_shade_options options = preview_options();
         options.method = method < SHADOW_METHODS ? method : VSH_SHADOW_CONE;
         options.ao_method = method < AO_METHODS ? method : VSH_AO_TAPS;
         options.rays = 16;
-        vsh_query *query = query_of(occluders_of_caster(&c), lights, LIGHTS, &options);
+        OWNED(vsh_query) *query = query_of(occluders_of_caster(&c), lights, LIGHTS, &options);
         const size_t counts[] = {1, 2, 64, 65, FEW};
         for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
             const vsh_points points = {counts[n], positions + 3 * 9000, normals, texels};
@@ -95,20 +92,18 @@ TEST(values_and_deviations_are_those_of_the_shade_calls) {
                 assert_memory_equal(expected_deviation, deviations[l], counts[n] * sizeof expected[0]);
             }
         }
-        vsh_query_free(query);
     }
-    caster_free(&c);
 }
 
 TEST(values_follow_points_that_are_shuffled_on_any_number_of_threads) {
-    casting c = caster_of(truth_seeds(), 0.04, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CONE, VSH_SHADOW_RAYS};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
         vsh_shade_options options = preview_options();
         options.method = methods[m];
         options.ao_method = m == 2 ? VSH_AO_RAYS : VSH_AO_TAPS;
         options.rays = 4;
-        vsh_query *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
+        OWNED(vsh_query) *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
         static float in_order[LIGHTS + 1][MANY];
         const vsh_points points = {MANY, positions, normals, NULL};
         ask(query, &points, 2);
@@ -123,19 +118,17 @@ TEST(values_follow_points_that_are_shuffled_on_any_number_of_threads) {
                 }
             }
         }
-        vsh_query_free(query);
     }
-    caster_free(&c);
 }
 
 /* The order tells its samplers the points' numbers, where there are no texels. */
 TEST(points_without_texels_are_told_apart_by_their_numbers_in_any_order) {
-    casting c = caster_of(truth_seeds(), 0.1, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.1, 0.0);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_RAYS;
     options.ao_method = VSH_AO_RAYS;
     options.rays = 2;
-    vsh_query *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
+    OWNED(vsh_query) *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
     const vsh_points points = {MANY, shuffled_positions, shuffled_normals, NULL};
     ask(query, &points, 2);
     for (int l = 0; l <= LIGHTS; ++l) {
@@ -143,14 +136,12 @@ TEST(points_without_texels_are_told_apart_by_their_numbers_in_any_order) {
         assert_memory_equal(expected, values[l], sizeof expected);
     }
     assert_memory_equal(expected_deviation, deviations[LIGHTS], sizeof expected);
-    vsh_query_free(query);
-    caster_free(&c);
 }
 
 TEST(points_that_are_invalid_are_nan_and_leave_the_others_alone) {
-    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_shade_options preview = preview_options(); /* rays of adaptive are shared with neighbours */
-    vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, &preview);
+    OWNED(vsh_query) *query = query_of(occluders_of(field), lights, LIGHTS, &preview);
     static float before[LIGHTS + 1][MANY];
     const vsh_points all = {MANY, shuffled_positions, shuffled_normals, NULL};
     const size_t bad[] = {0, 31000, 31001, MANY - 1};
@@ -180,19 +171,17 @@ TEST(points_that_are_invalid_are_nan_and_leave_the_others_alone) {
         }
     }
     shuffle();
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 TEST(one_point_has_the_value_that_it_has_among_many) {
-    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CLASSIC, VSH_SHADOW_IMPROVED, VSH_SHADOW_CONE,
                                VSH_SHADOW_RAYS};
     for (size_t m = 0; m < sizeof methods / sizeof methods[0]; ++m) {
         vsh_shade_options options = preview_options();
         options.method = methods[m];
         options.rays = 8;
-        vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, &options);
+        OWNED(vsh_query) *query = query_of(occluders_of(field), lights, LIGHTS, &options);
         const vsh_points points = {MANY, positions, normals, texels};
         static float among[LIGHTS + 1][MANY];
         ask(query, &points, 2);
@@ -204,14 +193,12 @@ TEST(one_point_has_the_value_that_it_has_among_many) {
                 assert_int_equal(bits_of(values[l][0]), bits_of(among[l][i]));
             }
         }
-        vsh_query_free(query);
     }
-    vsh_field_free(field);
 }
 
 TEST(what_is_not_asked_for_is_not_marched) {
-    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
-    vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
+    OWNED(vsh_query) *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     const vsh_points points = {FEW, positions, normals, NULL};
     vsh_query_output output = vsh_query_output_default();
     vsh_shade_stats none = vsh_shade_stats_zero(), one = none, alone = none;
@@ -229,9 +216,6 @@ TEST(what_is_not_asked_for_is_not_marched) {
     const vsh_points nothing = {0, NULL, NULL, NULL};
     assert_int_equal(vsh_query_points(query, &nothing, NULL, NULL, &output, &none, NULL), VSH_OK);
     assert_int_equal(none.marches, 0);
-    vsh_query_free(query);
-    vsh_query_free(NULL);
-    vsh_field_free(field);
 }
 
 typedef struct asker {
@@ -254,11 +238,11 @@ static void *ask_alone(void *user) {
 }
 
 TEST(a_handle_is_shared_by_threads) {
-    vsh_field *field = field_of(truth_seeds(), 0.04, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     vsh_shade_options options = preview_options();
     options.method = VSH_SHADOW_ADAPTIVE;
-    vsh_query *query = query_of(occluders_of(field), &light, 1, &options);
+    OWNED(vsh_query) *query = query_of(occluders_of(field), &light, 1, &options);
     static asker askers[5];
     pthread_t threads[4];
     for (int i = 0; i < 5; ++i) {
@@ -272,8 +256,6 @@ TEST(a_handle_is_shared_by_threads) {
         pthread_join(threads[i], NULL);
         assert_memory_equal(askers[i].value, askers[4].value, sizeof askers[4].value);
     }
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 static int32_t stop_at(void *user, const char *stage, double fraction) {
@@ -282,16 +264,15 @@ static int32_t stop_at(void *user, const char *stage, double fraction) {
 }
 
 TEST(limits_and_cancelling_have_their_codes) {
-    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
-    vsh_query *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
+    OWNED(vsh_query) *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     float *const visibility[LIGHTS] = {values[0], NULL};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
     const vsh_points shuffled = {MANY, shuffled_positions, shuffled_normals, NULL};
     vsh_field_info info;
     vsh_field_get_info(field, &info);
-    vsh_run run = vsh_run_default();
-    run.memory_limit = info.bytes + 16 * MANY - 4096;
+    vsh_run run = run_within(info.bytes + 16 * MANY - 4096);
     assert_fails(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure), VSH_ERROR_LIMIT,
                  "query");
     run.memory_limit = info.bytes + 16 * MANY + 4096;
@@ -305,13 +286,11 @@ TEST(limits_and_cancelling_have_their_codes) {
         assert_fails(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure),
                      VSH_ERROR_CANCELLED, "");
     }
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 TEST(bad_arguments_are_refused_by_name) {
-    vsh_field *field = field_of(truth_seeds(), 0.2, 1.0);
-    vsh_query *query = NULL;
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.2, 1.0);
+    OWNED(vsh_query) *query = NULL;
     const vsh_light none[LIGHTS] = {lights[0], lamp(truth_seeds_sun, -1.0)};
     assert_fails(vsh_query_create(occluders_of(field), none, LIGHTS, NULL, &query, &failure),
                  VSH_ERROR_ARGUMENT, "light 1");
@@ -347,10 +326,6 @@ TEST(bad_arguments_are_refused_by_name) {
     output = vsh_query_output_default();
     output.struct_size = 0;
     assert_fails(vsh_query_points(query, &bare, NULL, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
-int main(void) {
-    return run_all_tests(fill_points, NULL);
-}
+FIXTURE(fill_points, NULL)

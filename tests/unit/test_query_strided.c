@@ -3,8 +3,6 @@
 #include "testing.h"
 #include "traced.h"
 
-#include <vdbshade/query.h>
-
 enum { SIDE = 256, MANY = SIDE * SIDE };
 
 /* As an engine's vertices stand in memory. */
@@ -72,10 +70,10 @@ static void ask(const vsh_query *query, size_t count, const double *at, const vs
 }
 
 TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
-    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     fill_points();
-    vsh_query *query = query_of(field, &light, VSH_SHADOW_RAYS);
+    OWNED(vsh_query) *query = query_of(field, &light, VSH_SHADOW_RAYS);
     const size_t counts[] = {1, 64, 65, 1000, MANY};
     for (size_t n = 0; n < sizeof counts / sizeof counts[0]; ++n) {
         const size_t count = counts[n];
@@ -100,10 +98,7 @@ TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
             output.distance = &vertices[0].distance;
             output.gradient = vertices[0].gradient;
             output.stride = sizeof vertices[0];
-            vsh_error why = {VSH_OK, ""};
-            if (vsh_query_points(query, &points, &layout, NULL, &output, NULL, &why) != VSH_OK) {
-                fail_msg("%s", why.message);
-            }
+            assert_ok(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &failure));
             for (size_t i = 0; i < count; ++i) {
                 assert_int_equal(bits_of(vertices[i].visibility), bits_of(visibility[i]));
                 /* of rays in an order, deviations depend on it; it is the same one */
@@ -125,15 +120,13 @@ TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
     memset(visibility, 0, sizeof kept);
     assert_ok(vsh_query_points(query, &points, &layout, NULL, &packed, NULL, &failure));
     assert_memory_equal(kept, visibility, sizeof kept);
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 TEST(distance_is_the_fields_and_near_the_truth) {
     const double voxel = 0.04;
-    vsh_field *field = field_of(truth_seeds(), voxel, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), voxel, 0.0);
     fill_points();
-    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    OWNED(vsh_query) *query = query_of(field, NULL, VSH_SHADOW_CONE);
     vsh_query_output output = vsh_query_output_default();
     output.distance = distance;
     ask(query, MANY, positions, &output);
@@ -143,21 +136,18 @@ TEST(distance_is_the_fields_and_near_the_truth) {
         const double true_distance = truth_distance(truth_seeds(), positions + 3 * i);
         if (true_distance > 0.0) { /* within solids that touch, the scene's is none */
             const double excess = ((double)distance[i] - true_distance) / fmax(voxel, true_distance);
-            if (!(excess > -0.4 && excess < 0.3)) {
-                fail_msg("distance %g, expected %g", (double)distance[i], true_distance);
-            }
+            assert_that(excess > -0.4 && excess < 0.3, "distance %g, expected %g", (double)distance[i],
+                        true_distance);
         }
     }
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 TEST(gradients_are_unit_and_point_away_from_the_sphere) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .center = {0.3, -0.2, 0.1}, .radius = 1.0};
     const truth_scene scene = {&ball, 1};
     const double voxel = 0.05;
-    vsh_field *field = field_of(scene, voxel, 0.0);
-    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    OWNED(vsh_field) *field = field_of(scene, voxel, 0.0);
+    OWNED(vsh_query) *query = query_of(field, NULL, VSH_SHADOW_CONE);
     enum { COUNT = 5000 };
     uint64_t count = 9;
     for (size_t i = 0; i < COUNT; ++i) {
@@ -190,17 +180,14 @@ TEST(gradients_are_unit_and_point_away_from_the_sphere) {
     }
     /* A trilinear cell's gradient turns by up to half of its diagonal over the distance to the centre: 0.87 ×
      * 0.05, or 2.5°. At the end of the reach corners of cells are clamped. */
-    if (!(worst_near > cos(RADIANS(2.5))) || !(worst > cos(RADIANS(8.0)))) {
-        fail_msg("off by %g and %g degrees", acos(worst_near) / RADIANS(1.0), acos(worst) / RADIANS(1.0));
-    }
-    vsh_query_free(query);
-    vsh_field_free(field);
+    assert_that(worst_near > cos(RADIANS(2.5)) && worst > cos(RADIANS(8.0)), "off by %g and %g degrees",
+                acos(worst_near) / RADIANS(1.0), acos(worst) / RADIANS(1.0));
 }
 
 TEST(there_is_no_gradient_beyond_the_reach_nor_where_nothing_is) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
-    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.05, 1.0);
-    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, 0.05, 1.0);
+    OWNED(vsh_query) *query = query_of(field, NULL, VSH_SHADOW_CONE);
     const double places[4][3] = {
         {1e6, 0.0, 0.0}, {(double)NAN, 0.0, 0.0}, {0.0, (double)INFINITY, 0.0}, {1.1, 0.0, 0.0}};
     vsh_query_output output = vsh_query_output_default();
@@ -214,18 +201,16 @@ TEST(there_is_no_gradient_beyond_the_reach_nor_where_nothing_is) {
     }
     assert_true(isnan(distance[1]) && isnan(distance[2]));
     assert_true(gradient[9] > 0.99f);
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 TEST(calls_for_a_batch_each_give_the_bits_of_one_call) {
     enum { ALL = VSH_QUERY_BATCH + 40000 };
-    vsh_field *field = field_of(truth_seeds(), 0.1, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.1);
-    vsh_query *query = query_of(field, &light, VSH_SHADOW_ADAPTIVE);
-    double *at = malloc((size_t)ALL * 3 * sizeof *at);
-    float *one = malloc((size_t)ALL * sizeof *one), *parts = malloc((size_t)ALL * sizeof *parts);
-    uint32_t *numbers = malloc((size_t)ALL * sizeof *numbers);
+    OWNED(vsh_query) *query = query_of(field, &light, VSH_SHADOW_ADAPTIVE);
+    FREED double *at = malloc((size_t)ALL * 3 * sizeof *at);
+    FREED float *one = malloc((size_t)ALL * sizeof *one), *parts = malloc((size_t)ALL * sizeof *parts);
+    FREED uint32_t *numbers = malloc((size_t)ALL * sizeof *numbers);
     assert_true(at != NULL && one != NULL && parts != NULL && numbers != NULL);
     uint64_t count = 2;
     for (uint32_t i = 0; i < ALL; ++i) {
@@ -255,18 +240,12 @@ TEST(calls_for_a_batch_each_give_the_bits_of_one_call) {
     }
     assert_true(between_them > 1000);
     assert_memory_equal(parts, one, (size_t)ALL * sizeof *one);
-    free(at);
-    free(one);
-    free(parts);
-    free(numbers);
-    vsh_query_free(query);
-    vsh_field_free(field);
 }
 
 TEST(strides_that_are_none_are_refused_by_name) {
     const truth_solid ball = {.shape = TRUTH_SPHERE, .radius = 1.0};
-    vsh_field *field = field_of((truth_scene){&ball, 1}, 0.1, 1.0);
-    vsh_query *query = query_of(field, NULL, VSH_SHADOW_CONE);
+    OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, 0.1, 1.0);
+    OWNED(vsh_query) *query = query_of(field, NULL, VSH_SHADOW_CONE);
     const vsh_points good = {2, positions, normals, texels};
     const struct {
         vsh_point_layout layout;
@@ -300,10 +279,4 @@ TEST(strides_that_are_none_are_refused_by_name) {
     layout.struct_size = 0;
     assert_fails(vsh_query_points(query, &good, &layout, NULL, &output, NULL, &failure), VSH_ERROR_ARGUMENT,
                  "vsh_point_layout");
-    vsh_query_free(query);
-    vsh_field_free(field);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

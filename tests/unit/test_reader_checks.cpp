@@ -90,7 +90,7 @@ TEST(damaged_decompressed_vertices_are_refused_or_sound) {
         payload_of(vshi_serve_draco, std::string(VSH_MODELS) + "/scene_draco.glb", [](vshi_encoder *) {});
     int refused = 0;
     damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
-        vshi_lit_dracos dracos = {};
+        FREED_BY(vshi_lit_dracos_free) vshi_lit_dracos dracos = {};
         dracos.list = static_cast<vshi_lit_draco *>(std::calloc(PRIMITIVES, sizeof *dracos.list));
         dracos.count = PRIMITIVES;
         refused += vshi_lit_dracos_decode(decoder, "a.glb", &dracos, &failure) != VSH_OK;
@@ -108,7 +108,6 @@ TEST(damaged_decompressed_vertices_are_refused_or_sound) {
             }
             assert_true(sum < 1000000);
         }
-        vshi_lit_dracos_free(&dracos);
     });
     assert_in_range(refused, DAMAGES / 64, DAMAGES - 1);
 }
@@ -142,14 +141,13 @@ TEST(damaged_images_and_contours_are_refused_or_sound) {
         vshi_contours contours = {};
         contours.run = &run;
         contours.error = &failure;
-        vsh_outline *outline = nullptr;
+        OWNED(vsh_outline) *outline = nullptr;
         if (vshi_contours_decode(decoder, &contours, "a.ttf", &failure) != VSH_OK) {
             vshi_contours_free(&contours);
             ++refused;
         } else if (vshi_contours_finish(&contours, false, "text", &outline) != VSH_OK) {
             ++refused;
         }
-        vsh_outline_free(outline);
     });
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
 }

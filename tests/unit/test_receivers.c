@@ -8,7 +8,7 @@ static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 
 TEST(receivers_deep_inside_are_dark_and_far_outside_are_lit) {
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
-    casting c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
+    FREED_BY(caster_free) casting c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
     uint64_t counter = 12;
     for (int i = 0; i < 400; ++i) {
         double d[3], out[3];
@@ -27,13 +27,11 @@ TEST(receivers_deep_inside_are_dark_and_far_outside_are_lit) {
             const float inside = cast_kind_at(&c, kind, &light, 1.0, p, facing),
                         outside = cast_kind_at(&c, kind, &from, 1.0, q, facing);
             /* taps go up the normal by the AO distance, and may come out of the solid */
-            if ((kind == SHADOWS + VSH_AO_TAPS ? !(inside < 1.0f) : inside != 0.0f) || outside != 1.0f) {
-                fail_msg("%s: %.9g at (%g, %g, %g) inside, %.9g outside", name_of(kind), (double)inside, p[0],
-                         p[1], p[2], (double)outside);
-            }
+            assert_that((kind == SHADOWS + VSH_AO_TAPS ? inside < 1.0f : inside == 0.0f) && outside == 1.0f,
+                        "%s: %.9g at (%g, %g, %g) inside, %.9g outside", name_of(kind), (double)inside, p[0],
+                        p[1], p[2], (double)outside);
         }
     }
-    caster_free(&c);
 }
 
 /* As far as doubles go, in every direction from the casters, towards them and away, by every method. */
@@ -42,6 +40,7 @@ TEST(receivers_at_any_distance_are_lit) {
     const double scales[] = {1e-10, 1e-6, 1.0, 1e10};
     uint64_t counter = 5;
     for (int s = 0; s < 4; ++s) {
+        FREED_BY(caster_free)
         casting c = caster_of_moved((truth_scene){&block, 1}, 0.2, scales[s], NOWHERE, 0.0);
         for (double away = 1e6; away < 1e280; away *= away < 1e24 ? 10.0 : 1e16) {
             double out[3], other[3];
@@ -56,20 +55,17 @@ TEST(receivers_at_any_distance_are_lit) {
                 for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
                     const bool one_sided = l == 2 || l == 3 ? method < VSH_SHADOW_CONE : false;
                     const float v = cast_shadow_at(&c, &lights[l], method, q, NULL);
-                    if (one_sided || l == 4 ? !(v >= 0.0f && v <= 1.0f) : v != 1.0f) {
-                        fail_msg("%g sizes away, light %d, %s: %.9g", away, l, name_of(method), (double)v);
-                    }
+                    assert_that(one_sided || l == 4 ? v >= 0.0f && v <= 1.0f : v == 1.0f,
+                                "%g sizes away, light %d, %s: %.9g", away, l, name_of(method), (double)v);
                 }
             }
             for (int32_t method = 0; method < AO_METHODS; ++method) {
                 assert_true(cast_ao_at(&c, method, scales[s], q, n) == 1.0f);
                 const float v = cast_ao_at(&c, method, 2.0 * far, q, n);
-                if (!(v > (method == VSH_AO_TAPS ? -1.0f : 0.9f) && v <= 1.0f)) {
-                    fail_msg("%g sizes away, %s: %.9g", away, name_of(SHADOWS + method), (double)v);
-                }
+                assert_that(v > (method == VSH_AO_TAPS ? -1.0f : 0.9f) && v <= 1.0f,
+                            "%g sizes away, %s: %.9g", away, name_of(SHADOWS + method), (double)v);
             }
         }
-        caster_free(&c);
     }
 }
 
@@ -80,7 +76,7 @@ TEST(receivers_on_voxel_planes_see_what_their_neighbours_see) {
     static double at[3 * ALL];
     static float ns[3 * ALL], values[ALL];
     static uint32_t texels[ALL]; /* neighbours take the same rays */
-    casting c = caster_of(truth_seeds(), 0.0625, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.0625, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     uint64_t counter = 8;
     for (uint32_t i = 0; i < PLACES; ++i) {
@@ -117,17 +113,14 @@ TEST(receivers_on_voxel_planes_see_what_their_neighbours_see) {
                 changed += apart > 1e-4;
             }
         }
-        print_message("%s beside lattice planes: %.3g apart at most, %zu of %d beyond 1e-4\n", name_of(kind),
-                      worst, changed, PLACES * SIDES);
         const bool rays =
             is_ao(kind) ? kind >= SHADOWS + VSH_AO_RAYS : kind >= VSH_SHADOW_RAYS || kind == VSH_SHADOW_HARD;
         assert_true(rays ? changed < PLACES * SIDES / 100 : worst < 1e-4);
     }
-    caster_free(&c);
 }
 
 TEST(normals_of_any_length_are_directions) {
-    casting c = caster_of(truth_seeds(), 0.0625, 0.0);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.0625, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     const int exponents[] = {-149, -126, -60, -1, 1, 60, 127};
     for (int i = 0; i < 60; ++i) {
@@ -140,14 +133,13 @@ TEST(normals_of_any_length_are_directions) {
             }
         }
     }
-    caster_free(&c);
 }
 
 /* NaN and counted, in every method; the points beside them are as they are without them. The last place is a
  * double, but no place in field space. */
 TEST(points_that_are_none_are_nan_and_counted) {
     enum { PLACES = 9, BAD = 7 };
-    casting c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
+    FREED_BY(caster_free) casting c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
     const float nan = (float)NAN, inf = (float)INFINITY;
     const double at[3 * PLACES] = {
@@ -167,9 +159,4 @@ TEST(points_that_are_none_are_nan_and_counted) {
         const float one = cast_kind_at(&c, kind, &light, 0.5e-9, at, ns);
         assert_int_equal(bits_of(one), bits_of(all[0]));
     }
-    caster_free(&c);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -35,20 +35,19 @@ TEST(rays_of_every_kind_see_what_brute_force_sees) {
             }
             const difference d = compare(values, truth);
             const bool exact = METHODS[m] == VSH_SHADOW_EXACT;
-            if (!(d.root_mean_square < MOST[m][l]) ||
-                (exact && !(fabs(d.bias) < 0.001 && d.root_mean_square < 1.1 * sqrt(square) + 1e-3))) {
-                fail_msg("light %d, %s: off by %g, %g is said, on average %g, at most %g", l,
-                         vsh_get_name(VSH_NAMES_SHADOW, METHODS[m]), d.root_mean_square, sqrt(square), d.bias,
-                         d.largest);
-            }
+            assert_that(
+                d.root_mean_square < MOST[m][l] &&
+                    (!exact || (fabs(d.bias) < 0.001 && d.root_mean_square < 1.1 * sqrt(square) + 1e-3)),
+                "light %d, %s: off by %g, %g is said, on average %g, at most %g", l,
+                vsh_get_name(VSH_NAMES_SHADOW, METHODS[m]), d.root_mean_square, sqrt(square), d.bias,
+                d.largest);
         }
         if (c->triangles != NULL) {
             assert_ok(vsh_trace_shadow(c->triangles, NULL, COUNT, positions, normals, 0.0, &light, 4096, NULL,
                                        values, &failure));
             const difference d = compare(values, truth);
-            if (!(d.root_mean_square < 0.003 && d.largest < 0.02)) {
-                fail_msg("light %d, traced: off by %g, at most %g", l, d.root_mean_square, d.largest);
-            }
+            assert_that(d.root_mean_square < 0.003 && d.largest < 0.02,
+                        "light %d, traced: off by %g, at most %g", l, d.root_mean_square, d.largest);
         }
     }
 }
@@ -65,10 +64,8 @@ TEST(one_march_takes_the_disc_of_equal_solid_angle) {
             const vsh_shade_options options = options_of(method);
             shade(c, &light, &options, values, NULL);
             const difference d = compare(values, truth);
-            if (!(d.root_mean_square < 0.12)) {
-                fail_msg("light %d, %s: off by %g", l, vsh_get_name(VSH_NAMES_SHADOW, method),
-                         d.root_mean_square);
-            }
+            assert_that(d.root_mean_square < 0.12, "light %d, %s: off by %g", l,
+                        vsh_get_name(VSH_NAMES_SHADOW, method), d.root_mean_square);
         }
     }
     /* far away a square is a ball */
@@ -84,10 +81,8 @@ TEST(one_march_takes_the_disc_of_equal_solid_angle) {
         shade(c, &square, &options, values, NULL);
         shade(c, &ball, &options, of_ball, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
-            if (!(fabsf(values[i] - of_ball[i]) < 1e-6f)) {
-                fail_msg("%s, point %zu: %g, the ball %g", vsh_get_name(VSH_NAMES_SHADOW, method), i,
-                         (double)values[i], (double)of_ball[i]);
-            }
+            assert_that(fabsf(values[i] - of_ball[i]) < 1e-6f, "%s, point %zu: %g, the ball %g",
+                        vsh_get_name(VSH_NAMES_SHADOW, method), i, (double)values[i], (double)of_ball[i]);
         }
     }
 }
@@ -102,10 +97,8 @@ TEST(a_tiny_rectangle_is_a_point) {
         shade(c, &tiny, &options, values, NULL);
         shade(c, &point, &options, of_point, NULL);
         for (size_t i = 0; i < COUNT; ++i) {
-            if (values[i] != of_point[i]) {
-                fail_msg("%s, point %zu: %g, not %g", vsh_get_name(VSH_NAMES_SHADOW, method), i,
-                         (double)values[i], (double)of_point[i]);
-            }
+            assert_that(values[i] == of_point[i], "%s, point %zu: %g, not %g",
+                        vsh_get_name(VSH_NAMES_SHADOW, method), i, (double)values[i], (double)of_point[i]);
         }
     }
 }
@@ -134,24 +127,21 @@ TEST(behind_a_one_sided_one_is_nothing_and_two_sides_are_alike) {
         }
     }
     /* blocks of voxels above and below it; nothing casts */
-    vsh_field *nothing = NULL;
+    OWNED(vsh_field) *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     vsh_light light = light_of(0);
     light.two_sided = 0;
     light.position[1] = 0.015;
-    vsh_voxels *voxels = cube_of(1.6, 0.1);
+    OWNED(vsh_voxels) *voxels = cube_of(1.6, 0.1);
     vsh_volume_options options = vsh_volume_options_default();
     options.shade.method = VSH_SHADOW_ADAPTIVE;
-    vsh_volume *volume = bake(occluders_of(nothing), voxels, &light, 1, &options, NULL);
+    OWNED(vsh_volume) *volume = bake(occluders_of(nothing), voxels, &light, 1, &options, NULL);
     const dense d = copy_of(volume, 0, voxels);
     for (size_t i = 0; i < d.count; ++i) {
         const int32_t y = (int32_t)(i / (size_t)d.size[2] % (size_t)d.size[1]);
         assert_true(d.values[i] == (2 * y >= d.size[1] ? 0.0f : 1.0f));
     }
     free(d.values);
-    vsh_volume_free(volume);
-    vsh_voxels_free(voxels);
-    vsh_field_free(nothing);
 }
 
 /* In the plane of the rectangle: beside it, and within it. */
@@ -179,6 +169,4 @@ TEST(edge_on_is_a_share_all_the_same) {
     }
 }
 
-int main(void) {
-    return run_all_tests(set_up, tear_down);
-}
+FIXTURE(set_up, tear_down)

@@ -3,10 +3,8 @@
 #include "rectangles.h"
 #include "testing.h"
 
-#include <stdio.h>
-
 TEST(the_horizon_cuts_it_by_solid_angle) {
-    vsh_field *nothing = NULL;
+    OWNED(vsh_field) *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     vsh_layer layer = vsh_layer_default();
     layer.field = nothing;
@@ -33,12 +31,11 @@ TEST(the_horizon_cuts_it_by_solid_angle) {
                          VSH_OK);
         assert_true(fabs((double)layered - truth) < 0.02);
     }
-    vsh_field_free(nothing);
 }
 
 TEST(layers_know_it) {
     const casting *c = *state;
-    vsh_field *nothing = NULL;
+    OWNED(vsh_field) *nothing = NULL;
     assert_int_equal(vshi_field_create_empty(0.1, &nothing, NULL), VSH_OK);
     const vsh_light light = light_of(0);
     vsh_layer layer = vsh_layer_default();
@@ -61,7 +58,6 @@ TEST(layers_know_it) {
         others += layered[i] != whole[i];
     }
     assert_true(others <= 2);
-    vsh_field_free(nothing);
 }
 
 TEST(threads_and_instruction_sets_give_the_same_bits) {
@@ -71,8 +67,7 @@ TEST(threads_and_instruction_sets_give_the_same_bits) {
     for (int32_t method = VSH_SHADOW_HARD; method < SHADOW_METHODS; ++method) {
         const vsh_light light = light_of(method % LIGHTS);
         const vsh_shade_options options = options_of(method);
-        vsh_run run = vsh_run_default();
-        run.threads = 1;
+        vsh_run run = run_on(1);
         run.isa = VSH_ISA_BASE;
         assert_int_equal(vsh_shade_shadow(occluders_of_caster(c), &points, &light, &options, &run, values,
                                           NULL, NULL, NULL),
@@ -154,6 +149,4 @@ TEST(what_is_no_rectangle_is_refused) {
     assert_string_equal(text, "rectangle at 0.2 2.4 -0.3, sides 1.2 0 0 and 0 0 0.8, two-sided");
 }
 
-int main(void) {
-    return run_all_tests(set_up, tear_down);
-}
+FIXTURE(set_up, tear_down)

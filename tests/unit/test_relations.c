@@ -7,8 +7,6 @@
 #include "field/field.h"
 #include "levelset/access.h"
 
-#include <stdlib.h>
-
 enum { SIDE = 64, COUNT = SIDE * SIDE, VALUES = SHADOWS + KINDS };
 
 static const double NOWHERE[3] = {0.0, 0.0, 0.0};
@@ -118,7 +116,7 @@ static void assert_same_field(const vsh_field *a, const vsh_field *b) {
 TEST(scaled_by_a_power_of_two_every_bit_stays) {
     static values still, scaled;
     fill_points();
-    casting c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
+    FREED_BY(caster_free) casting c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
     shade_all(&c, &STILL, &still);
     const int exponents[] = {-34, -20, -10, 3, 20, 40, 44};
     for (size_t e = 0; e < sizeof exponents / sizeof exponents[0]; ++e) {
@@ -127,17 +125,15 @@ TEST(scaled_by_a_power_of_two_every_bit_stays) {
         if (0.03125 * m.scale > 1e12) {
             continue;
         }
+        FREED_BY(caster_free)
         casting other = caster_of_moved(truth_seeds(), 0.03125, m.scale, NOWHERE, 8.0 * m.scale);
         assert_same_field(c.field, other.field);
         shade_all(&other, &m, &scaled);
         for (int k = 0; k < VALUES; ++k) {
-            if (memcmp(still.v[k], scaled.v[k], sizeof still.v[k]) != 0) {
-                fail_msg("scaled by 2^%d: other bits of %s", exponents[e], name_of(kind_of(k)));
-            }
+            assert_that(memcmp(still.v[k], scaled.v[k], sizeof still.v[k]) == 0,
+                        "scaled by 2^%d: other bits of %s", exponents[e], name_of(kind_of(k)));
         }
-        caster_free(&other);
     }
-    caster_free(&c);
 }
 
 /* A box and a pyramid without its base, of floats that any power of two scales exactly. */
@@ -168,9 +164,8 @@ static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
     options.voxel_size = 0.0625 * scale;
     options.half_width = half_width;
     vsh_grid *grid = NULL;
-    if (vsh_grid_from_meshes(meshes, open ? 2 : 1, &options, NULL, &grid, &failure) != VSH_OK) {
-        fail_msg("scale %g: %s", scale, failure.message);
-    }
+    assert_that(vsh_grid_from_meshes(meshes, open ? 2 : 1, &options, NULL, &grid, &failure) == VSH_OK,
+                "scale %g: %s", scale, failure.message);
     return grid;
 }
 
@@ -205,7 +200,7 @@ TEST(meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit) {
                  {9.0, true, {-35, -20, -12, 5, 20, 43}},
                  {0.0, false, {-35, -20, 20, 42}}};
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        vsh_field *field = NULL;
+        OWNED(vsh_field) *field = NULL;
         for (int e = -1; e < 6; ++e) {
             const double scale = e < 0 ? 1.0 : ldexp(1.0, cases[i].exponents[e]);
             vsh_field *scaled = field_of_grid(cases[i].half_width > 0.0
@@ -218,7 +213,6 @@ TEST(meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit) {
                 vsh_field_free(scaled);
             }
         }
-        vsh_field_free(field);
     }
 }
 
@@ -247,8 +241,6 @@ static apart apart_when_moved(const double voxels[3]) {
         all.rms = fmax(all.rms, a.rms);
         all.beyond += a.beyond;
     }
-    print_message("moved by (%g, %g, %g) voxels: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n", voxels[0],
-                  voxels[1], voxels[2], all.rms, all.worst, all.beyond, VALUES * COUNT);
     return all;
 }
 
@@ -283,7 +275,7 @@ TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
     static values still, there;
     static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     fill_points();
-    casting c = caster_of_turned(&STILL, 0.04);
+    FREED_BY(caster_free) casting c = caster_of_turned(&STILL, 0.04);
     shade_all(&c, &STILL, &still);
     apart worst[VALUES] = {{0.0, 0.0, 0}};
     for (int turn = 1; turn < 48; turn += 2 + turn % 3) {
@@ -305,8 +297,6 @@ TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
         }
     }
     for (int k = 0; k < VALUES; ++k) {
-        print_message("turned, %s: rms %.2g, worst %.2g, %zu of %d beyond 0.01\n", name_of(kind_of(k)),
-                      worst[k].rms, worst[k].worst, worst[k].beyond, COUNT);
         const int kind = kind_of(k);
         if (is_ao(kind) ? kind > SHADOWS + VSH_AO_TAPS : kind >= VSH_SHADOW_RAYS) {
             /* where rays and cones lie in the disc or hemisphere does not turn with the scene */
@@ -315,9 +305,4 @@ TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
             assert_true(worst[k].rms < 1e-4 && worst[k].worst < 2e-3 && worst[k].beyond == 0);
         }
     }
-    caster_free(&c);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

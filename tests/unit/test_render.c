@@ -5,7 +5,7 @@
 TEST(a_sphere_is_where_it_is_with_its_normals) {
     enum { VOXELS = 50 };
     const double centre[3] = {0.1, -0.2, 0.3}, voxel = 1.0 / VOXELS;
-    vsh_field *field = ball(centre[0], centre[1], centre[2], 1.0, voxel);
+    OWNED(vsh_field) *field = ball(centre[0], centre[1], centre[2], 1.0, voxel);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     const vsh_render_options o = small(camera_at(3.0, 2.0, 4.0, 0.0, 0.0, 0.0, 35.0), 1);
     render(&surface, 1, field, NULL, &o, NULL);
@@ -39,11 +39,10 @@ TEST(a_sphere_is_where_it_is_with_its_normals) {
         }
     }
     assert_true(seen > 300 && missed > 300);
-    vsh_field_free(field);
 }
 
 TEST(a_silhouette_has_its_area_and_soft_edges) {
-    vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
+    OWNED(vsh_field) *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     for (int32_t samples = 1; samples <= 4; samples += 3) {
         const vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), samples);
@@ -60,7 +59,6 @@ TEST(a_silhouette_has_its_area_and_soft_edges) {
         /* one ray a pixel hits or misses; more make an edge of about a pixel */
         assert_true(samples == 1 || between_them > 2.0 * PI * radius * 0.5);
     }
-    vsh_field_free(field);
 }
 
 /* Rays that meet y = 0 within a square end at heights in a range. */
@@ -93,11 +91,10 @@ TEST(no_ray_misses_a_floor_or_a_thin_sheet) {
     }
     vsh_field_free(seeds);
     const truth_solid solid = {.shape = TRUTH_BOX, .half = {2.0, 0.05, 2.0}};
-    vsh_field *sheet = field_of((truth_scene){&solid, 1}, 0.05, 0.0);
+    OWNED(vsh_field) *sheet = field_of((truth_scene){&solid, 1}, 0.05, 0.0);
     for (double height = 0.3; height < 40.0; height *= 1.6) {
         assert_rays_end(sheet, camera_at(0.9, height, 1.1, 0.0, 0.0, 0.0, 30.0), 1.9, 0.048, 0.052, 20);
     }
-    vsh_field_free(sheet);
 }
 
 /* Visibility × cosine of the seeds' sun, or (NULL) AO. */
@@ -160,7 +157,7 @@ static void check_floor(const vsh_field *field, const vsh_light *light, vsh_rend
 }
 
 TEST(a_floor_has_the_shadow_and_the_ao_of_its_points) {
-    vsh_field *field = field_of(truth_seeds(), 0.03, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.03, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     vsh_render_options o = small(camera_at(1.0, 5.0, 3.0, 0.0, 0.0, 0.0, 40.0), 1);
     int dark, lit, between_them;
@@ -171,11 +168,10 @@ TEST(a_floor_has_the_shadow_and_the_ao_of_its_points) {
     o.sky[0] = o.sky[1] = o.sky[2] = 1.0;
     check_floor(field, NULL, o, 0.9, &dark, &lit, &between_them);
     assert_true(lit > 300 && between_them > 10);
-    vsh_field_free(field);
 }
 
 TEST(the_nearest_surface_has_its_own_color) {
-    vsh_field *front = ball(0.0, 0.0, 1.0, 0.5, 0.05), *back = ball(0.4, 0.0, -1.0, 0.8, 0.05);
+    OWNED(vsh_field) *front = ball(0.0, 0.0, 1.0, 0.5, 0.05), *back = ball(0.4, 0.0, -1.0, 0.8, 0.05);
     const vsh_surface surfaces[2] = {{back, {0.9, 0.1, 0.2}}, {front, {0.1, 0.8, 0.3}}};
     vsh_render_options o = small(camera_at(0.0, 0.0, 6.0, 0.0, 0.0, 0.0, 25.0), 2);
     const double sky[3] = {0.5, 1.0, 2.0};
@@ -189,25 +185,21 @@ TEST(the_nearest_surface_has_its_own_color) {
         assert_true(fabs((double)beside[c] - surfaces[0].color[c] * sky[c]) < 1e-5);
         assert_true(fabs((double)nothing[c] - o.background[c]) < 1e-5);
     }
-    vsh_field_free(front);
-    vsh_field_free(back);
 }
 
 TEST(who_looks_from_within_sees_out) {
-    vsh_field *within = ball(0.0, 0.0, 0.0, 1.0, 0.05), *beyond = ball(4.0, 0.0, 0.0, 1.0, 0.05);
+    OWNED(vsh_field) *within = ball(0.0, 0.0, 0.0, 1.0, 0.05), *beyond = ball(4.0, 0.0, 0.0, 1.0, 0.05);
     const vsh_surface surfaces[2] = {{within, {0.5, 0.5, 0.5}}, {beyond, {0.5, 0.5, 0.5}}};
     const vsh_render_options o = small(camera_at(0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 20.0), 1);
     render(surfaces, 2, within, NULL, &o, NULL);
     assert_true(fabs((double)depth[HIGH / 2 * WIDE + WIDE / 2] - 3.0) < 0.01);
-    vsh_field_free(within);
-    vsh_field_free(beyond);
 }
 
 /* --- what holds for all */
 
 TEST(threads_and_instruction_sets_change_no_bit) {
     static float first[3 * PIXELS];
-    vsh_field *field = field_of(truth_seeds(), 0.05, 0.0);
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.05, 0.0);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
     vsh_render_options o = small(camera_at(3.0, 3.0, 4.0, 0.0, 0.5, 0.0, 40.0), 2);
     const vsh_light light = sun(truth_seeds_sun, 0.2);
@@ -216,8 +208,7 @@ TEST(threads_and_instruction_sets_change_no_bit) {
     o.shaft_steps = 3;
     const struct { int32_t threads, isa; } runs[] = {{1, VSH_ISA_BASE}, {3, VSH_ISA_BASE}, {2, VSH_ISA_BEST}};
     for (size_t i = 0; i < sizeof runs / sizeof runs[0]; ++i) {
-        vsh_run run = vsh_run_default();
-        run.threads = runs[i].threads;
+        vsh_run run = run_on(runs[i].threads);
         run.isa = runs[i].isa;
         render(&surface, 1, field, &light, &o, &run);
         if (i == 0) {
@@ -225,7 +216,6 @@ TEST(threads_and_instruction_sets_change_no_bit) {
         }
         assert_memory_equal(first, color, sizeof first);
     }
-    vsh_field_free(field);
 }
 
 static int32_t stop(void *user, const char *stage, double fraction) {
@@ -236,7 +226,7 @@ static int32_t stop(void *user, const char *stage, double fraction) {
 }
 
 TEST(what_is_out_of_range_cancelled_or_limited_is_refused) {
-    vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
+    OWNED(vsh_field) *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
     const vsh_occluders *casters = occluders_of(field);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}},
                       none = {NULL, {0.5, 0.5, 0.5}};
@@ -275,7 +265,6 @@ TEST(what_is_out_of_range_cancelled_or_limited_is_refused) {
     run.memory_limit = 100000;
     assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
                  VSH_ERROR_LIMIT, "");
-    vsh_field_free(field);
 }
 
 /* --- cameras */
@@ -381,7 +370,7 @@ TEST(an_orbit_turns_around_the_target) {
 
 /* The box around the sphere has a diagonal of 2 √3, and the fog a quarter of that around it. */
 TEST(fog_in_the_sun_shines_and_in_shadow_does_not) {
-    vsh_field *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
+    OWNED(vsh_field) *field = ball(0.0, 0.0, 0.0, 1.0, 0.02);
     const vsh_surface surface = {field, {0.0, 0.0, 0.0}};
     const double x[3] = {1.0, 0.0, 0.0};
     const vsh_light light = sun(x, 0.0);
@@ -400,7 +389,6 @@ TEST(fog_in_the_sun_shines_and_in_shadow_does_not) {
             side == 0 ? o.background[0] * left + 1.0 - left : 1.0 - exp(-extinction * around);
         assert_true(fabs((double)c[0] - expected) < 0.015);
     }
-    vsh_field_free(field);
 }
 
 /* --- lightmaps */
@@ -432,7 +420,7 @@ TEST(a_lightmap_is_looked_up_where_it_was_baked) {
     const vsh_lit_meshes lit = {&mesh, 1, &image, {0.5, 1.0, 0.25}, 0};
     const double z[3] = {0.0, 0.0, 1.0};
     const vsh_light light = sun(z, 0.1);
-    vsh_field *field = ball(0.0, 0.0, -3.0, 0.5, 0.05); /* hidden behind it */
+    OWNED(vsh_field) *field = ball(0.0, 0.0, -3.0, 0.5, 0.05); /* hidden behind it */
     const vsh_surface surface = {field, {1.0, 0.0, 0.0}};
     vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 20.0), 1);
     const double sky[3] = {1.0, 0.0, 2.0};
@@ -474,7 +462,6 @@ TEST(a_lightmap_is_looked_up_where_it_was_baked) {
     assert_fails(vsh_render(&surface, 1, occluders_of(field), &light, 1, &o, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
     assert_string_equal(failure.message, "lit is NULL with a lit_count of 1");
-    vsh_field_free(field);
 }
 
 TEST(irradiance_comes_before_shadows) {
@@ -485,7 +472,7 @@ TEST(irradiance_comes_before_shadows) {
     const vsh_mesh mesh = quad();
     const vsh_lit_meshes lit = {&mesh, 1, &image, {1.0, 1.0, 0.5}, 0};
     const vsh_light light = vsh_light_default();
-    vsh_field *field = ball(0.0, 0.0, -3.0, 0.5, 0.05);
+    OWNED(vsh_field) *field = ball(0.0, 0.0, -3.0, 0.5, 0.05);
     vsh_render_options o = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 20.0), 1);
     memset(o.sky, 0, sizeof o.sky);
     o.lit = &lit;
@@ -494,7 +481,6 @@ TEST(irradiance_comes_before_shadows) {
     const float *c = color + 3 * (HIGH / 2 * WIDE + WIDE / 2);
     assert_true(fabs((double)c[0] - 0.2) < 1e-5 && fabs((double)c[1] - 0.4) < 1e-5 &&
                 fabs((double)c[2] - 0.3) < 1e-5);
-    vsh_field_free(field);
 }
 
 TEST(gradients_are_dithered_to_srgb) {
@@ -519,8 +505,4 @@ TEST(gradients_are_dithered_to_srgb) {
     assert_true(fabs(255.0 * (double)planes[0][7] - 187.516) < 1.0); /* 0.25 over half of a pixel */
     assert_true(fabs((double)planes[3][7] - 128.0 / 255.0) < 1e-6);
     assert_fails(vsh_picture_encode(&picture, WIDE, HIGH, NAN, rgb, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

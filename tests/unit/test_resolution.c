@@ -3,8 +3,6 @@
 #include "scenes.h"
 #include "testing.h"
 
-#include <vdbshade/vdbshade.h>
-
 enum { POINTS = 400 };
 
 /* A plate of 2 × 2, 0.2 thick, whose top is at y = 1. */
@@ -146,9 +144,9 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
              "\"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0.6, 0.75, 0.5], "
              "\"angle_deg\": 5}], \"receivers\": []}",
              layered ? ", \"layer\": \"thin\"" : "");
-    vsh_scene *scene = parse("/scene.json", text);
-    vsh_assets *assets = NULL;
-    vsh_occluders *made = NULL;
+    OWNED(vsh_scene) *scene = parse("/scene.json", text);
+    OWNED(vsh_assets) *assets = NULL;
+    OWNED(vsh_occluders) *made = NULL;
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     assert_ok(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &failure));
     vsh_occluders_info info;
@@ -159,15 +157,11 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     scatter(positions, normals);
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
     assert_ok(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &failure));
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     vsh_solids *solids = NULL;
     assert_ok(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
     assert_ok(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
                                1024, NULL, truth, &failure));
-    vsh_triangles_free(triangles);
-    vsh_occluders_free(made);
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
     return info.field_bytes;
 }
 
@@ -191,12 +185,10 @@ TEST(scenes_and_layers_without_voxels_cast_as_the_truth_says) {
 static int32_t chosen(const char *more, const char *casters, double points) {
     char text[2048];
     snprintf(text, sizeof text, "{\"casters\": [%s], \"receivers\": []%s}", casters, more);
-    vsh_scene *scene = parse("/scene.json", text);
-    vsh_assets *assets = NULL;
+    OWNED(vsh_scene) *scene = parse("/scene.json", text);
+    OWNED(vsh_assets) *assets = NULL;
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     const int32_t resolution = vsh_scene_resolution(scene, assets, NULL, points);
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
     return resolution;
 }
 
@@ -239,8 +231,4 @@ TEST(what_is_named_stays_as_it_is) {
     assert_int_equal(chosen(SUN ", \"voxel_size\": 0.5", BALL, 1.0), VSH_RESOLUTION_NAMED);
     assert_int_equal(chosen(SUN ", \"method\": \"cone\"", MESH, 1.0), 256);
     assert_int_equal(chosen(SUN ", \"method\": \"adaptive\"", MESH, 1.0), 256);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

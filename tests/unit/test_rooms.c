@@ -205,17 +205,10 @@ TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
         float near[2], far[2];
         cast_ao(&c, method, 0.5, 2, at, up, near);
         cast_ao(&c, method, 6.0, 2, at, up, far);
-        print_message("AO %s: %.3f and %.3f within 0.5, %.3f and %.3f within 6\n",
-                      vsh_get_name(VSH_NAMES_AO, method), (double)near[0], (double)near[1], (double)far[0],
-                      (double)far[1]);
         assert_true(near[0] > 0.98f);
         /* a wall at 0.1 hides half of the hemisphere but for what is farther than 0.5 along it */
         assert_true(method == VSH_AO_TAPS || (near[1] > 0.5f && near[1] < 0.75f));
         /* cones see past thin walls */
         assert_true(method < VSH_AO_RAYS || (far[0] < 0.02f && far[1] < 0.02f));
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -221,7 +221,3 @@ TEST(points_asked_for_in_parts_are_the_same) {
         }
     }
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

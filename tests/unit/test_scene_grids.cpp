@@ -7,7 +7,6 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 #include <string>
-#include <vdbshade/scene.h>
 #include <vector>
 
 #include "levelset/access.h"
@@ -67,7 +66,7 @@ vsh_caster caster(const char *path, const char *grid, double scale, double x, do
     return made;
 }
 
-void several_grids_and_files_are_their_union(void **) {
+TEST(several_grids_and_files_are_their_union) {
     const vsh_caster casters[] = {caster(PAIR, "left", 1, 0, 0, 0), caster(PAIR, "right", 1, 0, 0, 0),
                                   caster(SINGLE, nullptr, 1, 0, 0, 0), caster(PAIR, "left", 0.5, 0, 2, 0),
                                   caster(PAIR, "right", 1, 0, -2, 1)};
@@ -77,11 +76,10 @@ void several_grids_and_files_are_their_union(void **) {
     scene.grid = vsh_grid_options_default();
     scene.grid.voxel_size = static_cast<double>(VOXEL);
     scene.shade = preview_options();
-    vsh_assets *assets = nullptr;
-    vsh_grid *grid = nullptr;
-    vsh_error error{};
-    assert_int_equal(vsh_assets_load(&scene, nullptr, &assets, &error), VSH_OK);
-    assert_int_equal(vsh_scene_casters(&scene, assets, nullptr, &grid, &error), VSH_OK);
+    OWNED(vsh_assets) *assets = nullptr;
+    OWNED(vsh_grid) *grid = nullptr;
+    assert_ok(vsh_assets_load(&scene, nullptr, &assets, &failure));
+    assert_ok(vsh_scene_casters(&scene, assets, nullptr, &grid, &failure));
     const size_t count = vshi_grid_leaves(grid, nullptr, 0);
     std::vector<vshi_leaf> leaves(count);
     vshi_grid_leaves(grid, leaves.data(), count);
@@ -111,18 +109,12 @@ void several_grids_and_files_are_their_union(void **) {
             }
         }
     }
-    print_message("five balls: at most %.3f voxels off\n", worst);
     assert_true(worst < 0.2);
     for (size_t seen : surfaces) { // every one of them is there
         assert_true(seen > 50);
     }
-    vsh_grid_free(grid);
-    vsh_assets_free(assets);
 }
+
+FIXTURE(write_files, remove_files)
 
 } // namespace
-
-int main() {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(several_grids_and_files_are_their_union)};
-    return cmocka_run_group_tests(tests, write_files, remove_files);
-}

@@ -79,10 +79,9 @@ TEST(every_shape_gives_the_distance_to_its_surface) {
             random_point(1.2, p);
             const double d = vsh_sdf_distance(&sdf, p);
             const double truth = brute_force(&node, p, pitch);
-            if (fabs(d) > fabs(truth) + 1e-9 || fabs(d) < fabs(truth) - 1.8 * pitch ||
-                (d < 0.0) != (truth < 0.0)) {
-                fail_msg("shape %d at %g, %g, %g: %g, brute force %g", shape, p[0], p[1], p[2], d, truth);
-            }
+            assert_that(fabs(d) <= fabs(truth) + 1e-9 && fabs(d) >= fabs(truth) - 1.8 * pitch &&
+                            (d < 0.0) == (truth < 0.0),
+                        "shape %d at %g, %g, %g: %g, brute force %g", shape, p[0], p[1], p[2], d, truth);
         }
     }
 }
@@ -236,9 +235,7 @@ TEST(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere) {
 static void refused(const vsh_sdf_node *nodes, size_t count, const char *part) {
     const vsh_sdf sdf = {nodes, count};
     assert_int_equal(vsh_sdf_check(&sdf, &failure), VSH_ERROR_INPUT);
-    if (strstr(failure.message, part) == NULL) {
-        fail_msg("'%s' does not hold '%s'", failure.message, part);
-    }
+    assert_that(strstr(failure.message, part) != NULL, "'%s' does not hold '%s'", failure.message, part);
 }
 
 TEST(bad_nodes_are_refused_by_name) {
@@ -366,8 +363,4 @@ TEST(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it) {
         }
     }
     assert_true(left_out > operations / 2); /* else it does not narrow */
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -111,7 +111,3 @@ TEST(a_stiff_system_takes_some_hundred_steps) {
     }
     vshi_job_end(job);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -120,12 +120,11 @@ static void compare_seen(const points *p, const char *what, const float *plane, 
         dark += !(error >= -WRONG);
     }
     const double rmse = sqrt(square / (double)count);
-    if (dark > 0 || !(rmse <= 0.01)) {
-        fail_msg("%s: %zu of %zu points are too dark by a quarter, RMSE %g", what, dark, count, rmse);
-    }
+    assert_that(dark == 0 && rmse <= 0.01, "%s: %zu of %zu points are too dark by a quarter, RMSE %g", what,
+                dark, count, rmse);
 }
 
-static void rooms_are_not_seen_darker_along_corners(void **state) {
+TEST(rooms_are_not_seen_darker_along_corners) {
     static const box ROOM = {{-2, 0, -2}, {2, 3, 2}};
     /* Its lower sides pass through centres of the floor's texels. */
     static const box CHEST = {{-0.46, 0, -0.46}, {0.46, 0.83, 0.39}};
@@ -146,9 +145,4 @@ static void rooms_are_not_seen_darker_along_corners(void **state) {
         compare_seen(p, open ? "AO under the sky" : "AO", planes, p->ao);
         compare_seen(p, open ? "sun" : "sun outside", planes + TEXELS * TEXELS, p->shadow);
     }
-}
-
-int main(void) {
-    const struct CMUnitTest tests[] = {cmocka_unit_test(rooms_are_not_seen_darker_along_corners)};
-    return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -75,9 +75,8 @@ TEST(what_is_refused_is_told_and_changes_nothing) {
         const vsh_scene before = vsh_scene_default();
         vsh_scene scene = before;
         const vsh_result result = vsh_scene_set(&scene, cases[i].name, cases[i].text, &failure);
-        if (result != cases[i].result || strstr(failure.message, cases[i].says) == NULL) {
-            fail_msg("%s %s: %s: %s", cases[i].name, cases[i].text, vsh_result_name(result), failure.message);
-        }
+        assert_that(result == cases[i].result && strstr(failure.message, cases[i].says) != NULL,
+                    "%s %s: %s: %s", cases[i].name, cases[i].text, vsh_result_name(result), failure.message);
         assert_memory_equal(&scene, &before, sizeof scene);
     }
     vsh_scene scene = vsh_scene_default();
@@ -143,9 +142,7 @@ static void row_of(const vsh_setting *setting, char *row, size_t size) {
         found = here && strncmp(row, begins, strlen(begins)) == 0;
     }
     fclose(file);
-    if (!found) {
-        fail_msg("%s: no row in docs/scene.md or docs/flat.md", setting->key);
-    }
+    assert_that(found, "%s: no row in docs/scene.md or docs/flat.md", setting->key);
 }
 
 /* Every number of `words` stands in `text`, in that order. */
@@ -156,9 +153,7 @@ static void expect_numbers(const vsh_setting *setting, const char *words, const 
         char number[32];
         snprintf(number, sizeof number, "%.*s", (int)strspn(c, digits), c);
         at = strstr(at, number);
-        if (at == NULL) {
-            fail_msg("%s: '%s' in the table, '%s' in the document", setting->key, words, text);
-        }
+        assert_that(at != NULL, "%s: '%s' in the table, '%s' in the document", setting->key, words, text);
         at += strlen(number);
         c += strlen(number);
         c += strcspn(c, digits);
@@ -184,10 +179,9 @@ TEST(the_document_has_every_key_with_its_range_and_default) {
             ++defaults;
         } else if (names && strstr(setting.range, setting.otherwise) != NULL) {
             cell(row, 2, text, sizeof text);
-            if (strstr(text, setting.otherwise) == NULL) {
-                fail_msg("%s: default '%s' in the table, '%s' in docs/scene.md", setting.key,
-                         setting.otherwise, text);
-            }
+            assert_that(strstr(text, setting.otherwise) != NULL,
+                        "%s: default '%s' in the table, '%s' in docs/scene.md", setting.key,
+                        setting.otherwise, text);
         }
     }
     assert_true(count >= 33 && ranges >= 19 && defaults >= 12);
@@ -197,8 +191,4 @@ TEST(settings_end) {
     vsh_setting setting = {.group = 77};
     assert_int_equal(vsh_setting_get(100000, &setting), 0);
     assert_int_equal(setting.group, 77);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

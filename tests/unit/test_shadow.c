@@ -72,11 +72,9 @@ TEST(open_sky_is_exactly_1_at_any_distance_and_size_of_light) {
                     const vsh_light light = sun(towards, 2.0 * half);
                     for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
                         const float v = shadow_at(field, &light, method, position, NULL);
-                        if (v != 1.0f) {
-                            fail_msg("shape %d, %g away, %g degrees, %g apart (least %g), %s: %.9g", shape,
-                                     away, ANGLES[a], apart, least, vsh_get_name(VSH_NAMES_SHADOW, method),
-                                     (double)v);
-                        }
+                        assert_that(v == 1.0f, "shape %d, %g away, %g degrees, %g apart (least %g), %s: %.9g",
+                                    shape, away, ANGLES[a], apart, least,
+                                    vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                     }
                 }
             }
@@ -99,11 +97,9 @@ TEST(a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon) {
                                      between(&counter, -4.0, 4.0)};
                 for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
                     const float v = shadow_at(field, &light, method, p, UP);
-                    if (v != 1.0f) {
-                        fail_msg("(%g, %g, %g), %g degrees, %g over the horizon, %s: %.9g", p[0], p[1], p[2],
-                                 ANGLES[a], over * 180.0 / PI, vsh_get_name(VSH_NAMES_SHADOW, method),
-                                 (double)v);
-                    }
+                    assert_that(v == 1.0f, "(%g, %g, %g), %g degrees, %g over the horizon, %s: %.9g", p[0],
+                                p[1], p[2], ANGLES[a], over * 180.0 / PI,
+                                vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                 }
             }
         }
@@ -134,10 +130,8 @@ TEST(the_middle_of_a_wide_umbra_is_exactly_0_at_any_depth) {
                 for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
                     for (int normal = 0; normal < 2; ++normal) {
                         const float v = shadow_at(field, &light, method, p, normal ? UP : NULL);
-                        if (v != 0.0f) {
-                            fail_msg("%g voxels deep, %g degrees, %s: %.9g", depth, lights[l],
-                                     vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
-                        }
+                        assert_that(v == 0.0f, "%g voxels deep, %g degrees, %s: %.9g", depth, lights[l],
+                                    vsh_get_name(VSH_NAMES_SHADOW, method), (double)v);
                     }
                 }
                 deepest = depth > (double)deepest ? (size_t)depth : deepest;
@@ -457,18 +451,13 @@ TEST(the_horizon_cuts_the_light_like_a_straight_edge) {
                 const vsh_light light = sun(towards, 2.0 * atan(ws[i]));
                 const double v = (double)shadow_at(field, &light, VSH_SHADOW_CONE, points[place], UP);
                 const double expected = truth_disc_share(0.1 * k);
-                if (fabs(v - expected) > 1e-3) {
-                    fail_msg("place %d, w %g, %g of the disc's radius over the horizon: %.6f, not %.6f",
-                             place, ws[i], 0.1 * k, v, expected);
-                }
+                assert_that(fabs(v - expected) <= 1e-3,
+                            "place %d, w %g, %g of the disc's radius over the horizon: %.6f, not %.6f", place,
+                            ws[i], 0.1 * k, v, expected);
                 if (k == 0) {
                     assert_float_equal(v, 0.5, 1e-6);
                 }
             }
         }
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

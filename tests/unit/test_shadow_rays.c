@@ -212,7 +212,3 @@ TEST(threads_and_order_do_not_show) {
         }
     }
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -58,33 +58,6 @@ TEST(neither_threads_nor_neighbours_show_in_the_bits) {
     }
 }
 
-TEST(a_scene_scaled_by_a_power_of_two_has_the_same_bits) {
-    static float visible[3][COUNT];
-    static double scaled[3 * COUNT];
-    fill_points();
-    const double scales[3] = {1.0, 1024.0, 1.0 / 1024.0}, nowhere[3] = {0.0, 0.0, 0.0};
-    vsh_field *fields[3];
-    for (int s = 0; s < 3; ++s) {
-        fields[s] = field_of_grid(grid_of_moved(truth_seeds(), 0.03125, scales[s], nowhere), scales[s] * 8.0);
-    }
-    for (int l = 0; l < 2; ++l) {
-        for (int32_t method = 0; method < METHODS; ++method) {
-            for (int s = 0; s < 3; ++s) {
-                for (size_t i = 0; i < 3 * COUNT; ++i) {
-                    scaled[i] = scales[s] * positions[i];
-                }
-                const double place[3] = {scales[s], 1.5 * scales[s], scales[s]};
-                const vsh_light light = l == 0 ? sun(truth_seeds_sun, 0.2) : lamp(place, 0.25 * scales[s]);
-                shadows(fields[s], &light, method, COUNT, scaled, normals, visible[s]);
-                assert_memory_equal(visible[0], visible[s], sizeof visible[0]);
-            }
-        }
-    }
-    for (int s = 0; s < 3; ++s) {
-        vsh_field_free(fields[s]);
-    }
-}
-
 TEST(every_point_is_marched_skipped_certified_or_invalid) {
     static float visible[COUNT];
     fill_points();
@@ -227,8 +200,4 @@ TEST(options_lights_and_cancelling_have_their_codes) {
     const vsh_points none = {0, NULL, NULL, NULL};
     assert_ok(vsh_shade_shadow(occluders_of(field), &none, &light, NULL, NULL, NULL, NULL, NULL, &failure));
     assert_true(shadow_at(field, &light, VSH_SHADOW_CONE, (const double[]){0.0, 9.0, 0.0}, UP) == 1.0f);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

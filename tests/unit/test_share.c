@@ -137,9 +137,7 @@ TEST(only_light_that_anchors_foretell_is_shared) {
                             fabs((double)share.value[k] - truth) <= most);
             good = good && (c > 0 || (share.deviation[k] > 0.004f && share.deviation[k] <= 0.0101f));
         }
-        if (!good) {
-            fail_msg("%s: %d and %d wanted, %d open", cases[c].name, wanted[0], wanted[1], open);
-        }
+        assert_that(good, "%s: %d and %d wanted, %d open", cases[c].name, wanted[0], wanted[1], open);
     }
     known_within = 0.01f;
 }
@@ -203,7 +201,7 @@ static vsh_shade_stats shade(const vsh_field *field, const uint32_t *at, int32_t
 
 /* Adaptive on a field, whose points share rays, keeps what is asked and said; for at most so much of the rays
  * that it takes when none are shared. */
-static void keep_the_error(const char *what, const vsh_field *field, double most_rays) {
+static void keep_the_error(const vsh_field *field, double most_rays) {
     const double asked[] = {0.05, 0.02, 0.01};
     place_floor();
     shade(field, numbers, VSH_SHADOW_RAYS, 0.02, reference, NULL);
@@ -227,7 +225,7 @@ static void keep_the_error(const char *what, const vsh_field *field, double most
 
 TEST(rays_are_saved_and_the_error_is_as_said) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.02, 0.0);
-    keep_the_error("seeds", field, 0.7);
+    keep_the_error(field, 0.7);
 }
 
 /* Rails close over the floor, whose shadows are a texel or two wide and pass between anchors. */
@@ -239,9 +237,5 @@ TEST(narrow_shadows_are_not_lost) {
             .shape = TRUTH_BOX, .half = {2.0, 0.015, 0.015}, .center = {0.0, 0.12, -0.6 + 0.17 * i}};
     }
     OWNED(vsh_field) *field = field_of((truth_scene){rails, RAILS}, 0.015, 0.0);
-    keep_the_error("rails", field, 1.1);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
+    keep_the_error(field, 1.1);
 }

@@ -17,10 +17,9 @@ static casting caster_of_boxes(const double (*corners)[2][3], int count, double 
     const vsh_grid_options options = with_voxel(voxel);
     vsh_grid *grid = NULL;
     vsh_triangles *triangles = NULL;
-    if (vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &failure) != VSH_OK ||
-        vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure) != VSH_OK) {
-        fail_msg("%s", failure.message);
-    }
+    assert_that(vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &failure) == VSH_OK &&
+                    vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure) == VSH_OK,
+                "%s", failure.message);
     return (casting){field_of_grid(grid, 0.0), triangles};
 }
 
@@ -104,10 +103,9 @@ TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
             const double hard = lightest_umbra(&made, 0.0, 1.5, 0.9, method);
             const double narrow = lightest_umbra(&made, RADIANS(0.5), 1.5, 0.9, method);
             const double wide = lightest_umbra(&made, RADIANS(20.0), 1.5, 0.3, method);
-            if (hard != 0.0 || narrow != 0.0 || wide != 0.0) {
-                fail_msg("%s, %s: lightest umbra: hard %g, 0.5 degrees %g, 20 degrees %g", cases[c].what,
-                         vsh_get_name(VSH_NAMES_SHADOW, method), hard, narrow, wide);
-            }
+            assert_that(hard == 0.0 && narrow == 0.0 && wide == 0.0,
+                        "%s, %s: lightest umbra: hard %g, 0.5 degrees %g, 20 degrees %g", cases[c].what,
+                        vsh_get_name(VSH_NAMES_SHADOW, method), hard, narrow, wide);
         }
         /* and beside the umbra as of the one box: its field's values differ by roundings of the mesh's */
         shade_row(&made, c == 0 ? &one : &other);
@@ -176,8 +174,4 @@ TEST(fields_that_are_not_1_lipschitz_are_right_where_they_say_so) {
             vsh_field_free(made.field);
         }
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

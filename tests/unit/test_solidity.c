@@ -320,7 +320,3 @@ TEST(odd_meshes_are_something) {
     assert_kinds(&nothing, 1, "");
     assert_kinds(&nothing, 0, "");
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

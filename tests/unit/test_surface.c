@@ -101,9 +101,8 @@ TEST(surface_is_closed) {
         assert_int_equal(count_open_edges(&q), 0);
     }
     for (size_t i = 0; i < 2; ++i) { /* its walls are thinner than the third */
-        quads q = quads_of(hollow, heights[i]);
+        FREED_BY(vshi_surface_quads_free) quads q = quads_of(hollow, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
-        vshi_surface_quads_free(&q);
     }
 }
 
@@ -279,8 +278,4 @@ TEST(surface_keeps_the_limit_and_ends_when_asked) {
     run.user = &most;
     assert_int_equal(make(grid, &run, &field, &failure), VSH_ERROR_CANCELLED);
     assert_null(field);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -553,7 +553,3 @@ TEST(bounds_of_charts_are_those_of_their_meshes) {
     assert_memory_equal(info.bounds_min, low, sizeof low);
     assert_memory_equal(info.bounds_max, high, sizeof high);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -12,9 +12,8 @@ static const double up[3] = {0.0, 1.0, 0.0};
 static const double origin[3] = {0.0, 0.0, 0.0};
 
 static void near_value(double value, double expected, double tolerance, const char *what) {
-    if (!(fabs(value - expected) <= tolerance)) {
-        fail_msg("%s: %.9g is not within %g of %.9g", what, value, tolerance, expected);
-    }
+    assert_that(fabs(value - expected) <= tolerance, "%s: %.9g is not within %g of %.9g", what, value,
+                tolerance, expected);
 }
 
 static truth_scene one(const truth_solid *solid) {
@@ -140,10 +139,8 @@ TEST(rays_hit_exactly_where_the_distance_along_them_falls_below_zero) {
             continue; /* grazes: the walk is too coarse to tell */
         }
         const bool hit = truth_solid_hit(solid, from, direction, INFINITY);
-        if (hit != (least < 0.0)) {
-            fail_msg("solid %zu, ray %zu: hit %d, but the least distance is %g", i % scene.count, i, hit,
-                     least);
-        }
+        assert_that(hit == (least < 0.0), "solid %zu, ray %zu: hit %d, but the least distance is %g",
+                    i % scene.count, i, hit, least);
         hits += hit ? 1 : 0;
         misses += hit ? 0 : 1;
     }
@@ -169,9 +166,8 @@ TEST(a_rounded_box_is_as_round_as_it_says_everywhere) {
                     from[k] = box.center[k] + sign[k] * box.half[k] +
                               frame.n[k] * box.radius * (over != 0 ? 1.001 : 0.999) - 3.0 * direction[k];
                 }
-                if (truth_solid_hit(&box, from, direction, INFINITY) != (over == 0)) {
-                    fail_msg("side %d %d %d, tangent %d, over %d", sign[0], sign[1], sign[2], i, over);
-                }
+                assert_that(truth_solid_hit(&box, from, direction, INFINITY) == (over == 0),
+                            "side %d %d %d, tangent %d, over %d", sign[0], sign[1], sign[2], i, over);
             }
         }
     }
@@ -384,8 +380,4 @@ TEST(metrics_are_right_by_hand) {
     const truth_metrics broken = truth_compare(100, values, truth, mask);
     assert_true(isinf(broken.max) && isinf(broken.rmse) && broken.worst == 7);
     assert_int_equal(truth_compare(0, values, truth, NULL).count, 0);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

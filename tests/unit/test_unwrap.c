@@ -104,12 +104,11 @@ TEST(shapes_have_few_charts_of_little_stretch) {
         const vsh_mesh mesh = shape_mesh(s, shapes[i].name);
         unwrap_well(&mesh, 1, &small, NULL);
         const vsh_atlas_info info = unwrap_mesh(&mesh, 256);
-        if (info.charts < shapes[i].least || info.charts > shapes[i].most ||
-            info.stretch > shapes[i].stretch || info.worst_stretch > shapes[i].worst ||
-            info.covered < shapes[i].covered) {
-            fail_msg("%s: %u charts, stretch %g, at worst %g, %g covered", mesh.name, info.charts,
-                     info.stretch, info.worst_stretch, info.covered);
-        }
+        assert_that(info.charts >= shapes[i].least && info.charts <= shapes[i].most &&
+                        info.stretch <= shapes[i].stretch && info.worst_stretch <= shapes[i].worst &&
+                        info.covered >= shapes[i].covered,
+                    "%s: %u charts, stretch %g, at worst %g, %g covered", mesh.name, info.charts,
+                    info.stretch, info.worst_stretch, info.covered);
     }
 }
 
@@ -140,9 +139,8 @@ TEST(bars_are_cut_along_edges_that_shading_shows) {
             vsh_mesh mesh = shape_mesh(s, "bar");
             mesh.normals = rounded == 2 ? NULL : &normals[0][0];
             const vsh_atlas_info info = unwrap_mesh(&mesh, 128);
-            if (info.charts != 1 + (rounded == 1 ? 1 : sides)) {
-                fail_msg("%u sides, %d: %d charts", sides, rounded, (int)info.charts);
-            }
+            assert_that(info.charts == 1 + (rounded == 1 ? 1 : sides), "%u sides, %d: %d charts", sides,
+                        rounded, (int)info.charts);
             assert_true(info.stretch < 1.01);
         }
     }
@@ -383,12 +381,7 @@ TEST(the_sample_assets_unwrap) {
         }
         const vsh_unwrap_options o = unwrap_into(assets[a].size);
         const vsh_atlas_info info = unwrap_well(meshes, count, &o, NULL);
-        if (info.covered < assets[a].covered || info.stretch > 1.05) {
-            fail_msg("%s: %g covered, stretch %g", path, info.covered, info.stretch);
-        }
+        assert_that(info.covered >= assets[a].covered && info.stretch <= 1.05, "%s: %g covered, stretch %g",
+                    path, info.covered, info.stretch);
     }
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -580,7 +580,3 @@ TEST(density_and_stretch_of_uvs_are_those_of_their_derivatives) {
     assert_true(measures.texels_per_unit == 0.0 && measures.stretch == 0.0);
     assert_int_equal(vsh_uvs_measure(&mesh, 0, 64, &measures, NULL), VSH_ERROR_ARGUMENT);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -381,7 +381,3 @@ TEST(casters_without_voxels_hide_light_and_are_solid) {
     assert_true(outside > 10000 && shaded_by_sphere > 100 && in_sphere > 500 && in_heights > 3000);
     assert_true(info.filled + info.off > in_ball + in_sphere + in_heights);
 }
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
-}

@@ -1,6 +1,5 @@
 // Volumes and .vdb files: the voxels of other grids, and what OpenVDB reads of what is written. In C++, to
 // write and read with OpenVDB what the library's own calls do not.
-#include "previews.h"
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -11,11 +10,10 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
 #include <string>
-#include <unistd.h>
-#include <vdbshade/volume.h>
 #include <vector>
 
-// Last: it has macros named as OpenVDB's members are.
+// Last: testing.h has macros named as OpenVDB's members are.
+#include "previews.h"
 #include "testing.h"
 
 namespace {
@@ -44,9 +42,7 @@ std::string save(const char *name, const openvdb::GridPtrVec &grids) {
 
 vsh_voxels *like(const std::string &path, const char *name) {
     vsh_voxels *voxels = nullptr;
-    if (vsh_voxels_from_vdb(path.c_str(), name, nullptr, &voxels, &failure) != VSH_OK) {
-        fail_msg("%s", failure.message);
-    }
+    assert_ok(vsh_voxels_from_vdb(path.c_str(), name, nullptr, &voxels, &failure));
     return voxels;
 }
 
@@ -60,13 +56,11 @@ vsh_voxels_info info_of(const vsh_voxels *voxels) {
 vsh_occluders *ball() {
     vsh_sdf_node node = vsh_sdf_node_default();
     const vsh_sdf tree = {&node, 1};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.1;
-    vsh_grid *grid = nullptr;
+    const vsh_grid_options options = with_voxel(0.1);
+    OWNED(vsh_grid) *grid = nullptr;
     vsh_occluders *occluders = nullptr;
     assert_int_equal(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK);
     assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &failure), VSH_OK);
-    vsh_grid_free(grid);
     return occluders;
 }
 
@@ -76,23 +70,17 @@ vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels *voxels, bool 
     vsh_volume_options options = preview_volume_options();
     options.ao = ao;
     vsh_volume *volume = nullptr;
-    if (vsh_bake_volume(occluders, voxels, &light, 1, &options, nullptr, &volume, nullptr, &failure) !=
-        VSH_OK) {
-        fail_msg("%s", failure.message);
-    }
+    assert_ok(vsh_bake_volume(occluders, voxels, &light, 1, &options, nullptr, &volume, nullptr, &failure));
     return volume;
 }
 
 // A volume of the ball's shadow in a box of so many units to each side.
 vsh_volume *bake_box(double half, bool ao) {
     const double low[3] = {-half, -half, -half}, high[3] = {half, half, half};
-    vsh_occluders *occluders = ball();
-    vsh_voxels *voxels = nullptr;
+    OWNED(vsh_occluders) *occluders = ball();
+    OWNED(vsh_voxels) *voxels = nullptr;
     assert_int_equal(vsh_voxels_from_box(low, high, 0.1, nullptr, &voxels, &failure), VSH_OK);
-    vsh_volume *volume = bake(occluders, voxels, ao);
-    vsh_voxels_free(voxels);
-    vsh_occluders_free(occluders);
-    return volume;
+    return bake(occluders, voxels, ao);
 }
 
 // The first grid of a written volume, by OpenVDB's own reader.
@@ -121,12 +109,10 @@ FloatGrid::Ptr fog() {
     return grid;
 }
 
-// ---- Claims ----
-
-void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
+TEST(a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles) {
     const FloatGrid::Ptr source = fog();
     const std::string path = save("fog.vdb", {source});
-    vsh_voxels *voxels = like(path, "density");
+    OWNED(vsh_voxels) *voxels = like(path, "density");
     const vsh_voxels_info info = info_of(voxels);
     const uint64_t expected = 8 * 6 * 7 + 512 + 128 * 128 * 128;
     assert_int_equal(source->activeVoxelCount(), expected);
@@ -138,8 +124,8 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
     vsh_voxels_centre(voxels, index, centre);
     assert_true((Vec3d(centre) - source->indexToWorld(Coord(17, 18, 19))).length() < 1e-12);
 
-    vsh_occluders *occluders = ball();
-    vsh_volume *volume = bake(occluders, voxels, false);
+    OWNED(vsh_occluders) *occluders = ball();
+    OWNED(vsh_volume) *volume = bake(occluders, voxels, false);
     const FloatGrid::Ptr lit = written(volume, "lit.vdb", "shadow.sun", false);
     assert_true(lit->transform() == source->transform());
     vsh_volume_info done;
@@ -162,12 +148,9 @@ void a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles(void **) {
         }
     }
     assert_true(dark > 1000 && light > 100);
-    vsh_volume_free(volume);
-    vsh_occluders_free(occluders);
-    vsh_voxels_free(voxels);
 }
 
-void grids_of_any_numbers_will_do_and_the_first_is_taken(void **) {
+TEST(grids_of_any_numbers_will_do_and_the_first_is_taken) {
     const auto vectors = openvdb::Vec3SGrid::create();
     vectors->setName("velocity");
     vectors->fill(CoordBBox(0, 0, 0, 3, 3, 3), openvdb::Vec3s(1.0f));
@@ -186,22 +169,21 @@ void grids_of_any_numbers_will_do_and_the_first_is_taken(void **) {
         uint64_t count;
     } grids[] = {{nullptr, 1000}, {"id", 1000}, {"heat", 125}, {"mask", 64}};
     for (const auto &grid : grids) {
-        vsh_voxels *voxels = like(path, grid.name);
+        OWNED(vsh_voxels) *voxels = like(path, grid.name);
         assert_int_equal(info_of(voxels).count, grid.count);
-        vsh_voxels_free(voxels);
     }
 }
 
-void a_frustum_keeps_its_map(void **) {
+TEST(a_frustum_keeps_its_map) {
     const FloatGrid::Ptr source = FloatGrid::create(0.0f);
     source->setName("camera");
     source->fill(CoordBBox(0, 0, 0, 31, 31, 31), 1.0f);
     const openvdb::math::NonlinearFrustumMap map(Vec3d(0.0, 4.0, 4.0), Vec3d(0.0, -0.83, -0.55),
                                                  Vec3d(0.0, 0.275, -0.415), 0.5, 8.0, 32, 32, 32);
     source->setTransform(std::make_shared<openvdb::math::Transform>(map.copy()));
-    vsh_voxels *voxels = like(save("frustum.vdb", {source}), nullptr);
-    vsh_occluders *occluders = ball();
-    vsh_volume *volume = bake(occluders, voxels, false);
+    OWNED(vsh_voxels) *voxels = like(save("frustum.vdb", {source}), nullptr);
+    OWNED(vsh_occluders) *occluders = ball();
+    OWNED(vsh_volume) *volume = bake(occluders, voxels, false);
     const FloatGrid::Ptr lit = written(volume, "frustum-lit.vdb", "shadow.sun", false);
     assert_true(lit->transform() == source->transform());
     size_t dark = 0;
@@ -215,21 +197,17 @@ void a_frustum_keeps_its_map(void **) {
                     std::hypot(p[0], p[2]) < 1.3);
     }
     assert_true(dark > 10);
-    vsh_volume_free(volume);
-    vsh_occluders_free(occluders);
-    vsh_voxels_free(voxels);
 }
 
-void what_has_no_voxels_is_refused(void **) {
+TEST(what_has_no_voxels_is_refused) {
     vsh_voxels *voxels = nullptr;
     const auto refused = [&](const std::string &path, const char *name, vsh_result code,
                              std::initializer_list<const char *> parts) {
         assert_int_equal(vsh_voxels_from_vdb(path.c_str(), name, nullptr, &voxels, &failure), code);
         assert_null(voxels);
         for (const char *part : parts) {
-            if (std::strstr(failure.message, part) == nullptr) {
-                fail_msg("'%s' is not in '%s'", part, failure.message);
-            }
+            assert_that(std::strstr(failure.message, part) != nullptr, "'%s' is not in '%s'", part,
+                        failure.message);
         }
     };
     const auto vectors = openvdb::Vec3SGrid::create();
@@ -250,15 +228,13 @@ void what_has_no_voxels_is_refused(void **) {
     huge->setName("huge");
     huge->tree().addTile(3, Coord(0), 1.0f, true);
     const std::string huge_path = save("huge.vdb", {huge});
-    vsh_run run = vsh_run_default();
-    run.memory_limit = uint64_t(1) << 30;
-    assert_int_equal(vsh_voxels_from_vdb(huge_path.c_str(), nullptr, &run, &voxels, &failure),
-                     VSH_ERROR_LIMIT);
-    assert_non_null(std::strstr(failure.message, "'huge'"));
+    const vsh_run run = run_within(uint64_t(1) << 30);
+    assert_fails(vsh_voxels_from_vdb(huge_path.c_str(), nullptr, &run, &voxels, &failure), VSH_ERROR_LIMIT,
+                 "'huge'");
 }
 
-void other_programs_read_names_class_metadata_and_halves(void **) {
-    vsh_volume *volume = bake_box(2.0, true);
+TEST(other_programs_read_names_class_metadata_and_halves) {
+    OWNED(vsh_volume) *volume = bake_box(2.0, true);
     const FloatGrid::Ptr full = written(volume, "full.vdb", "shadow.sun", false);
     const FloatGrid::Ptr rounded = written(volume, "half.vdb", "shadow.sun", true);
     assert_true(!full->saveFloatAsHalf() && rounded->saveFloatAsHalf());
@@ -305,11 +281,10 @@ void other_programs_read_names_class_metadata_and_halves(void **) {
         const int32_t n = int32_t(i);
         assert_true(values[i] == full->tree().getValue(Coord(n % 40, n / 40 % 40, n / 1600)));
     }
-    vsh_volume_free(volume);
 }
 
-void a_failed_write_leaves_the_old_file(void **) {
-    vsh_volume *volume = bake_box(1.5, false);
+TEST(a_failed_write_leaves_the_old_file) {
+    OWNED(vsh_volume) *volume = bake_box(1.5, false);
     const std::string inner = in_folder("closed"), path = inner + "/out.vdb";
     assert_int_equal(std::system(("mkdir '" + inner + "'").c_str()), 0);
     assert_int_equal(vsh_volume_write(volume, inner.c_str(), 0, nullptr, 0, &failure),
@@ -322,29 +297,19 @@ void a_failed_write_leaves_the_old_file(void **) {
     assert_true(content(path) == "old");
     assert_int_equal(vsh_volume_write(volume, path.c_str(), 0, nullptr, 0, &failure), VSH_OK);
     assert_true(content(path) != "old");
-    vsh_volume_free(volume);
+}
+
+int make_folder(void **) {
+    const char *place = std::getenv("TMPDIR");
+    folder = std::string(place != nullptr ? place : ".") + "/vdbshade-volume-file-XXXXXX";
+    openvdb::initialize();
+    return mkdtemp(folder.data()) == nullptr;
 }
 
 int remove_folder(void **) {
     return std::system(("rm -r '" + folder + "'").c_str());
 }
 
-} // namespace
+FIXTURE(make_folder, remove_folder)
 
-int main() {
-    const char *place = std::getenv("TMPDIR");
-    folder = std::string(place != nullptr ? place : ".") + "/vdbshade-volume-file-XXXXXX";
-    if (mkdtemp(folder.data()) == nullptr) {
-        return 1;
-    }
-    openvdb::initialize();
-    const CMUnitTest tests[] = {
-        cmocka_unit_test(a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles),
-        cmocka_unit_test(grids_of_any_numbers_will_do_and_the_first_is_taken),
-        cmocka_unit_test(a_frustum_keeps_its_map),
-        cmocka_unit_test(what_has_no_voxels_is_refused),
-        cmocka_unit_test(other_programs_read_names_class_metadata_and_halves),
-        cmocka_unit_test(a_failed_write_leaves_the_old_file),
-    };
-    return cmocka_run_group_tests(tests, nullptr, remove_folder);
-}
+} // namespace

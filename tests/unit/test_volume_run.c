@@ -184,7 +184,7 @@ TEST(the_same_file_for_any_number_of_threads_and_instruction_set) {
             options.shade.ao_method = m == 0 ? VSH_AO_CONES : VSH_AO_RAYS;
             options.shade.ao_distance = 0.3;
             options.shade.rays = 16;
-            unsigned char *first = NULL;
+            FREED unsigned char *first = NULL;
             long first_size = 0;
             for (int n = 0; n < 3; ++n) {
                 vsh_run run = run_on(n == 0 ? 1 : 7);
@@ -195,18 +195,15 @@ TEST(the_same_file_for_any_number_of_threads_and_instruction_set) {
                 assert_int_equal(info.grids, m == 0 ? 2 : 4);
                 assert_ok(vsh_volume_write(volume, vdb_path, 0, NULL, 0, &failure));
                 vsh_volume_free(volume);
-                unsigned char *bytes;
-                const long size = size_of_file(&bytes);
+                FREED unsigned char *bytes = NULL;
+                const long size = size_of_file(n == 0 ? &first : &bytes);
                 if (n == 0) {
-                    first = bytes;
                     first_size = size;
                     continue;
                 }
                 assert_int_equal(size, first_size);
                 assert_memory_equal(bytes, first, (size_t)size);
-                free(bytes);
             }
-            free(first);
         }
     }
     vsh_voxels_free(all[1]);
@@ -449,6 +446,4 @@ TEST(bad_copies_are_refused) {
     assert_int_equal(vsh_vdb_copy(vdb_path, NULL, low, one, &run, &value, NULL, &failure), VSH_ERROR_LIMIT);
 }
 
-int main(void) {
-    return run_all_tests(make_file, remove_file);
-}
+FIXTURE(make_file, remove_file)

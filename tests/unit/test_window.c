@@ -75,10 +75,9 @@ TEST(planes_without_noise_are_exact_up_to_corners) {
             vshi_windows_sum(&t->windows);
             for (int32_t i = 0; i < width * height; ++i) {
                 const vshi_window_estimate e = estimate_at(t, i % width, i / width);
-                if (fabs(e.value - (double)t->texels[i].value) > 1e-6) {
-                    fail_msg("%d × %d, slopes %g %g, texel %d: %.9f instead of %.9f", width, height,
-                             slopes[s][0], slopes[s][1], i, e.value, (double)t->texels[i].value);
-                }
+                assert_that(fabs(e.value - (double)t->texels[i].value) <= 1e-6,
+                            "%d × %d, slopes %g %g, texel %d: %.9f instead of %.9f", width, height,
+                            slopes[s][0], slopes[s][1], i, e.value, (double)t->texels[i].value);
             }
             const vshi_window_estimate corner = estimate_at(t, 0, 0),
                                        middle = estimate_at(t, width / 2, height / 2);
@@ -178,7 +177,7 @@ TEST(edges_stay_sharp) {
 
 /* Beside what is half hidden, texels whose rays are all free keep their value. */
 TEST(open_texels_beside_an_edge_stay_open) {
-    table *t = make_table(EDGE, EDGE, 64);
+    FREED table *t = make_table(EDGE, EDGE, 64);
     uint64_t counter = 4;
     for (int32_t i = 0; i < TEXELS; ++i) {
         t->texels[i].value = i % EDGE < 43 ? 1.0f : draw(&counter, 64, 0.5);
@@ -191,7 +190,6 @@ TEST(open_texels_beside_an_edge_stay_open) {
         }
     }
     assert_true(most < 0.01);
-    free(t);
 }
 
 /* Areas with steep, slanted and winding edges, 1 … 3; 0 here and there. */
@@ -347,8 +345,4 @@ TEST(few_rays_leave_few_specks) {
         least = fmin(least, estimate_at(t, i % EDGE, i / EDGE).deviation);
     }
     assert_true(e.specks < 0.005 && least > 0.005);
-}
-
-int main(void) {
-    return run_all_tests(NULL, NULL);
 }

@@ -106,6 +106,14 @@ static inline void check_below(double value, double limit, int or_equal, const c
 #define assert_fails(call, code, part)                                                                       \
     check_result((failure.message[0] = '\0', (call)), code, part, __FILE__, __LINE__)
 
+/* Fails with a formatted message unless the condition holds. */
+#define assert_that(condition, ...)                                                                          \
+    do {                                                                                                     \
+        if (!(condition)) {                                                                                  \
+            fail_msg(__VA_ARGS__);                                                                           \
+        }                                                                                                    \
+    } while (0)
+
 #define assert_near(value, expected, tolerance) check_near(value, expected, tolerance, __FILE__, __LINE__)
 
 #define assert_less(value, limit) check_below((double)(value), (double)(limit), 0, __FILE__, __LINE__)

@@ -167,7 +167,7 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
                                 const vsh_atlas_info *info, uint32_t *claims, uint8_t *centres,
                                 chart_sums *sums) {
     const vsh_atlas_mesh m = vsh_atlas_mesh_view(atlas, index);
-    uint32_t *chart_of = calloc(m.vertex_count + 1, sizeof *chart_of);
+    FREED uint32_t *chart_of = calloc(m.vertex_count + 1, sizeof *chart_of);
     assert_non_null(chart_of);
     assert_int_equal(m.triangle_count, mesh->triangle_count);
     for (size_t i = 0; i < m.triangle_count; ++i) {
@@ -192,10 +192,8 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
             assert_true(c.at[k][0] >= 0 && c.at[k][0] <= page.width && c.at[k][1] >= 0 &&
                         c.at[k][1] <= page.height);
         }
-        if (!(doubled_area(&c) > 0.0)) {
-            fail_msg("mesh %zu: triangle %zu is flipped, or has no area: %g texels", index, i,
-                     doubled_area(&c));
-        }
+        assert_that(doubled_area(&c) > 0.0, "mesh %zu: triangle %zu is flipped, or has no area: %g texels",
+                    index, i, doubled_area(&c));
         double larger, smaller;
         const double world = stretch_of(mesh, &c, mesh->indices + 3 * i, &larger, &smaller);
         sums[chart].squares += 0.5 * (larger * larger + smaller * smaller) * world;
@@ -207,21 +205,18 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
                 const size_t texel =
                     ((size_t)view.page * (size_t)info->height + (size_t)y) * (size_t)info->width + (size_t)x;
                 if (touches(&c, x, y)) {
-                    if (claims[texel] != 0 && claims[texel] != chart + 1) {
-                        fail_msg("texel %d, %d of page %u: claimed by charts %u and %u", x, y, view.page,
-                                 claims[texel] - 1, chart);
-                    }
+                    assert_that(claims[texel] == 0 || claims[texel] == chart + 1,
+                                "texel %d, %d of page %u: claimed by charts %u and %u", x, y, view.page,
+                                claims[texel] - 1, chart);
                     claims[texel] = chart + 1;
                     assert_true(x >= view.min[0] && x < view.max[0] && y >= view.min[1] && y < view.max[1]);
                 }
-                if (has_centre(&c, x, y) && ++centres[texel] > 1) {
-                    fail_msg("texel %d, %d of page %u: two triangles of chart %u lie there", x, y, view.page,
-                             chart);
-                }
+                assert_that(!has_centre(&c, x, y) || ++centres[texel] == 1,
+                            "texel %d, %d of page %u: two triangles of chart %u lie there", x, y, view.page,
+                            chart);
             }
         }
     }
-    free(chart_of);
 }
 
 static inline void look_at_padding(const vsh_atlas_info *info, int padding, const uint32_t *claims) {
@@ -237,10 +232,9 @@ static inline void look_at_padding(const vsh_atlas_info *info, int padding, cons
                             continue;
                         }
                         const uint32_t other = at[(size_t)(y + dy) * (size_t)w + (size_t)(x + dx)];
-                        if (other != 0 && other != own) {
-                            fail_msg("page %u: charts %u and %u are nearer than %d texels at %d, %d", page,
-                                     own - 1, other - 1, padding, x, y);
-                        }
+                        assert_that(other == 0 || other == own,
+                                    "page %u: charts %u and %u are nearer than %d texels at %d, %d", page,
+                                    own - 1, other - 1, padding, x, y);
                     }
                 }
             }
@@ -266,9 +260,9 @@ static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh
         assert_true(view.covered > 0 && view.covered <= 1 && view.texels_per_unit >= info.texels_per_unit);
     }
     const size_t texels = (size_t)info.width * (size_t)info.height * info.pages;
-    uint32_t *claims = calloc(texels, sizeof *claims);
-    uint8_t *centres = calloc(texels, 1);
-    chart_sums *sums = calloc(info.charts, sizeof *sums);
+    FREED uint32_t *claims = calloc(texels, sizeof *claims);
+    FREED uint8_t *centres = calloc(texels, 1);
+    FREED chart_sums *sums = calloc(info.charts, sizeof *sums);
     assert_true(claims != NULL && centres != NULL && sums != NULL);
     for (size_t m = 0; m < count; ++m) {
         look_at_mesh(&meshes[m], m, atlas, &info, claims, centres, sums);
@@ -283,11 +277,10 @@ static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh
         const vsh_atlas_chart view = vsh_atlas_charts(atlas)[c];
         const double own = sqrt(sums[c].squares * sums[c].flat) / sums[c].world;
         if (sums[c].flat > 0.1) { /* texels: below, 32-bit UVs tell no more of the shape */
-            if (fabs(own - (double)view.stretch) > 5e-3 * own ||
-                (o->keep_uvs == VSH_UNWRAP_ALWAYS && own > o->max_stretch + 1e-3)) {
-                fail_msg("chart %u: stretch %g, said to be %g, at most %g", c, own, (double)view.stretch,
-                         o->max_stretch);
-            }
+            assert_that(fabs(own - (double)view.stretch) <= 5e-3 * own &&
+                            (o->keep_uvs != VSH_UNWRAP_ALWAYS || own <= o->max_stretch + 1e-3),
+                        "chart %u: stretch %g, said to be %g, at most %g", c, own, (double)view.stretch,
+                        o->max_stretch);
         }
         area += sums[c].world;
         stretch += sums[c].world * (double)view.stretch;
@@ -295,12 +288,8 @@ static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh
     }
     assert_true(fabs(info.stretch - stretch / area) < 1e-3 && fabs(info.worst_stretch - worst) < 1e-6);
     /* what only just touches a texel may be told either way */
-    if (fabs((double)claimed / of_pages - info.covered) > 0.01) {
-        fail_msg("%g of the texels are covered, said to be %g", (double)claimed / of_pages, info.covered);
-    }
-    free(sums);
-    free(centres);
-    free(claims);
+    assert_that(fabs((double)claimed / of_pages - info.covered) <= 0.01,
+                "%g of the texels are covered, said to be %g", (double)claimed / of_pages, info.covered);
 }
 
 static inline vsh_unwrap_options unwrap_into(int32_t size) {

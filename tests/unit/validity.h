@@ -5,8 +5,6 @@
 #include "casts.h"
 #include "testing.h"
 
-#include <stdbool.h>
-
 enum { MOST_QUADS = 4096, MOST_BOXES = 64, SIZE = 256 };
 
 typedef struct box {
@@ -90,13 +88,12 @@ typedef struct baked {
 
 static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threads, double distance) {
     baked b = {.stats = vsh_bake_stats_zero()};
-    vsh_run run = vsh_run_default();
-    run.threads = threads;
+    vsh_run run = run_on(threads);
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.resolution = resolution;
-    vsh_grid *grid = NULL;
-    vsh_field *field = NULL;
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_field) *field = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     assert_ok(vsh_grid_from_meshes(mesh, 1, &grid_options, &run, &grid, &failure));
     assert_ok(vsh_field_create(grid, NULL, &run, &field, &failure));
     assert_ok(vsh_triangles_create(mesh, 1, &run, &triangles, &failure));
@@ -116,9 +113,6 @@ static inline baked bake(const vsh_mesh *mesh, int32_t resolution, int32_t threa
     const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
     assert_ok(vsh_bake_lightmap(occluders_traced(field, triangles), b.charts, NULL, 0, NULL, &run, &lightmap,
                                 &b.stats, &failure));
-    vsh_triangles_free(triangles);
-    vsh_field_free(field);
-    vsh_grid_free(grid);
     return b;
 }
 
