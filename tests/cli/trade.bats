@@ -156,6 +156,7 @@ count() {
 2 trade.html --csv | "${TINY[@]}" -o trade.html --csv trade.html
 2 box.obj | "${TINY[@]}" -o trade.html --csv box.obj
 3 nowhere/trade.html | "${TINY[@]}" -o nowhere/trade.html
+4 'over the memory limit' --size | "${TINY[@]}" --size 2048 --memory-limit 60M -o trade.html
 LIST
     while read -r option value; do
         shade trade box.obj "${TINY[@]}" -o trade.html "$option" "$value"

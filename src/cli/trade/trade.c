@@ -219,8 +219,15 @@ static int load(trade_work *work) {
     return cli_check_result(result, &error);
 }
 
-static void allocate(trade_work *work) {
+static int allocate(trade_work *work) {
     const size_t lights = work->scene->light_count;
+    const double planes = (double)sizeof(float) * (double)(2 * lights + 2) * (double)work->texels;
+    if (planes > (double)work->run.memory_limit && work->run.memory_limit > 0) {
+        cli_say(
+            "%s: values and truth of %zu texels need %.0f MiB, over the memory limit: give a smaller --size",
+            work->settings->bake.input, work->texels, planes / 0x1p20);
+        return CLI_LIMIT;
+    }
     if (lights > 0) {
         work->subjects[work->subject_count++] = (trade_subject){.planes = lights};
     }
@@ -236,6 +243,7 @@ static void allocate(trade_work *work) {
     work->compared = calloc((lights + 1) * work->receiver_count, sizeof *work->compared);
     work->mask = malloc(work->texels);
     memset(work->mask, 1, work->texels);
+    return CLI_OK;
 }
 
 /* --- baking */
@@ -593,7 +601,7 @@ static void sort_runs(trade_subject *subject) {
 /* Loads the scene, makes its truth and measures all runs. */
 static int measure(trade_work *work) {
     CLI_TRY(load(work));
-    allocate(work);
+    CLI_TRY(allocate(work));
     CLI_TRY(make_fields(work));
     CLI_TRY(place_points(work));
     CLI_TRY(make_truth(work));
@@ -782,9 +790,13 @@ static void write_fastest(FILE *out, const trade_subject *subject, double target
     while (i < subject->run_count && !(subject->runs[i].front && subject->runs[i].error.rmse <= target)) {
         ++i;
     }
-    const trade_run *best = i < subject->run_count ? &subject->runs[i] : NULL;
+    if (i == subject->run_count) {
+        fprintf(out, "<tr><td>%g</td><td>–</td><td class=\"t\">none of these</td></tr>\n", target);
+        return;
+    }
+    const trade_run *best = &subject->runs[i];
     fprintf(out, "<tr><td>%g</td><td>%.3g</td><td class=\"t\"><code>%s</code></td></tr>\n", target,
-            best != NULL ? best->rate : 0.0, best != NULL ? best->options : "none of these");
+            best->rate, best->options);
 }
 
 /* Writes the CSV of all runs; bench/README.md explains the columns. */
