@@ -2,9 +2,8 @@
  * triangles are of one chart if the edge's coordinates in the lightmap are equal, too. Otherwise there is a
  * seam, if the surface is smooth.
  *
- * T-junctions: where an edge ends in the middle of a longer one. Ends of edges that the surface does not go
- * on beyond are put into a tree, which each of these edges is led through; those that lie on it cut it in
- * parts, whose ends are then the very places of others. */
+ * At a T-junction an edge ends in the middle of a longer one. A tree holds the ends of open edges. Each open
+ * edge is cut at the ends that lie on it, so that its parts have the same ends as their neighbours. */
 #include "bake/places.h"
 #include "bake/seams.h"
 #include "base/hash.h"
@@ -61,8 +60,8 @@ static const vsh_mesh *mesh_of_edge(const vshi_seam_pages *pages, uint32_t edge,
 
 /* --- two edges */
 
-/* How far apart the ends of an edge may be for two triangles to be of one chart, texels: what is rounded when
- * a file is written. A seam as narrow would be read at the same place on both sides. */
+/* Texels between the ends of an edge in two triangles of one chart, at most: files round coordinates. A
+ * bilinear lookup reads the same place on both sides of so narrow a seam. */
 static const double SAME_PLACE = 1.0 / 1024.0;
 
 static void look_at_edge(const vshi_seam_pages *pages, uint32_t edge, edge_end ends[2]) {
@@ -123,7 +122,7 @@ static bool are_smooth(const edge_end a[2], const edge_end b[2], double cosine) 
     return all;
 }
 
-/* What lies outside of the image is not baked. */
+/* Texels outside the image are not baked. */
 static bool are_inside(const edge_end a[2]) {
     const vshi_raster *raster = a[0].raster;
     bool all = true;
@@ -166,8 +165,8 @@ static vsh_result compare_pair(seam_search *search, const uint32_t edge[2], cons
 
 /* --- T-junctions */
 
-/* How far from an edge an end may be to lie on it, of the largest coordinate: places are rounded to 6e-8 of
- * it, at the edge's ends too. */
+/* Distance from an end to an edge that it lies on, at most, as a share of the largest coordinate. Rounding
+ * moves ends by 6e-8 of it. */
 static const double ON_EDGE = 5e-7;
 
 enum {

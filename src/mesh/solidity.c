@@ -25,7 +25,7 @@ struct vshi_solidity {
     vshi_components *found; /* [wholes.count]: as they are by themselves */
     bool *lent;             /* [wholes.count]: of another solidity, where a whole was found before */
     size_t mesh_count;
-    uint8_t *turned;    /* of all meshes: found[].turned, changed by later decisions */
+    uint8_t *turned;    /* copies of found[].turned; later decisions change them */
     uint8_t *sides;     /* of all meshes */
     uint8_t *holed;     /* likewise */
     size_t *first_side; /* [mesh_count + 1] */

@@ -289,11 +289,11 @@ int64_t vshi_outline_winding(const vsh_outline *o, vshi_point p) {
     return winding;
 }
 
-/* --- the border of what contours wind around: cut where they cross, kept where one side only is inside,
- * joined again. Quadratic at worst, near-linear where few contours cross, as letters do. */
+/* --- the border of the filled area: contours are cut where they cross. Parts with one side inside are kept
+ * and joined again. Time is quadratic at worst, and near-linear if few contours cross, as in letters. */
 
-/* How far beside the middle of a piece its sides are looked at: of its length, and of the outline's size,
- * below which rounding decides. */
+/* Distance from a piece's middle to the points that test its sides: a share of the piece's length, and of the
+ * outline's size, below which rounding would decide. */
 static const double SIDE_OF_LENGTH = 1e-4;
 static const double SIDE_OF_SIZE = 1e-13;
 

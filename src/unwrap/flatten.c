@@ -396,7 +396,7 @@ static uint32_t row_pattern(sparse *m, uint32_t row) {
 
 /* False where the matrix is not positive definite, as far as doubles tell. */
 static bool sparse_factor(sparse *m) {
-    static const double LEAST = 1e-13; /* of a pivot, against what the diagonal was */
+    static const double LEAST = 1e-13; /* pivot over the diagonal's old value */
     for (uint32_t row = 0; row < m->count; ++row) {
         m->work[row] = 0.0;
         m->marks[row] = VSHI_NONE;

@@ -184,7 +184,7 @@ typedef struct merging {
 static const double MOST_STRETCH = 1.045;
 
 static const double LEAST_SHARED = 0.12; /* of the border of the chart that has less of it */
-static const double HARD = 0.3;          /* what a length of seam counts as shared border */
+static const double HARD = 0.3;          /* weight of a hard seam's length in the shared border */
 
 /* Square of a joined chart's perimeter over its area: 12.6 for a disc, 16 for a square, 25 for a rectangle of
  * 4 to 1. Charts beyond that are joined only where they become no worse. */

@@ -157,8 +157,8 @@ static bool same_factor(double a, double b) {
     return fabs(a - b) <= SAME_FACTOR * b;
 }
 
-/* Whether two groups have the same charts, in sizes that differ by one factor; by none where a density is
- * asked for. */
+/* Whether two groups have the same charts up to one scale factor. With a given density the factor must be
+ * 1. */
 static bool are_alike(const work *w, const group *a, const group *b) {
     const vshi_item *x = w->items + a->first, *y = w->items + b->first;
     const double by = w->options->texels_per_unit > 0.0 ? 1.0 : x[0].factor / y[0].factor;

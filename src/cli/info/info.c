@@ -398,7 +398,7 @@ static int print_each(const mesh_info *info, const info_look *look) {
     const bool lines = info->count > PARAGRAPHS && !look->all;
     const vsh_uv_report none = {0}, *next = info->reports;
     if (lines) {
-        puts(" triangles  UV sets  over others  over itself mesh: what it is taken for\n"
+        puts(" triangles  UV sets  over others  over itself mesh: treated as\n"
              "(over others, over itself: texels that another object's triangle has, or one of its own)");
     }
     for (size_t i = 0; i < info->count; ++i) {

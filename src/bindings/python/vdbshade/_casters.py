@@ -16,7 +16,7 @@ from ._structs import constant, Filled, keep, path_of, split, Struct, struct_of,
 
 
 class Light(Struct, kind="vsh_light"):
-    """A light. What a type does not name is ignored; a size of 0 is a hard light.
+    """A light. Each type uses its own members and ignores the others. A size of 0 makes hard shadows.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ class Mesh(Struct, kind="vsh_mesh"):
     object : int
         meshes of one number are parts of one object; 0: an object of its own
     solidity : str
-        what it is taken for where it casts: "auto", "solid", "shell", "inward"
+        how it casts: "auto", "solid", "shell", "inward"
     alpha : str
         "opaque", "masked", "blended"
     one_sided : bool
@@ -189,7 +189,7 @@ class Mesh(Struct, kind="vsh_mesh"):
 
     @classmethod
     def _view(cls, given: Any, owner: Any) -> "Mesh":
-        """A view of what the library has, which `owner` keeps."""
+        """A view of a mesh that belongs to the library. The view keeps `owner` alive."""
         self = cls.__new__(cls)
         self.struct, self._owner = ffi.new("vsh_mesh *", given), owner
         n, m = given.vertex_count, given.triangle_count
@@ -222,7 +222,7 @@ class Mesh(Struct, kind="vsh_mesh"):
         return f"<vdbshade.Mesh {self.name!r}: {len(self.positions)} vertices, {len(self.indices)} triangles>"
 
     def matches(self, pattern: str) -> bool:
-        """Whether it is meant by a pattern: its name or its object's as a shell matches them."""
+        """Whether the mesh's name or its object's name matches a shell pattern."""
         return bool(ask(lib.vsh_mesh_matches, self, pattern))
 
     def check(self) -> types.MeshReport:
@@ -252,7 +252,7 @@ def meshes_of(given: Meshes, name: str = "meshes") -> Tuple[Any, int]:
 
 
 def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.SolidityReport]:
-    """What the pieces of meshes that cast together are taken for: a report for each mesh."""
+    """Reports for each mesh how many of its pieces are solids, rooms and sheets, if the meshes cast together."""
     structs, count = meshes_of(meshes)
     return call(lib.vsh_mesh_solidity, structs, count, Several(count), run=run)
 
@@ -315,7 +315,7 @@ class Model(Handle, kind="vsh_model"):
         return lib.vsh_model_unit(self.handle)
 
     def uv_sets(self, index: int) -> int:
-        """How many sets of UVs a mesh has."""
+        """The number of UV sets of a mesh."""
         return lib.vsh_model_uv_sets(self.handle, index_of(index, len(self), "mesh"))
 
     @property
@@ -489,7 +489,7 @@ class Sdf(Struct, kind="vsh_sdf"):
         return self.moved(rotation=(*(unit * numpy.sin(angle / 2)), numpy.cos(angle / 2)))
 
     def __len__(self) -> int:
-        """How many nodes the tree has."""
+        """The number of nodes of the tree."""
         return len(self._nodes)
 
     def distance(self, positions: ArrayLike) -> numpy.ndarray:
@@ -610,7 +610,7 @@ def _distances(user: Any, count: int, positions: Any, distances: Any) -> None:
     result = numpy.frombuffer(ffi.buffer(distances, 8 * count), numpy.float64)
     result[:] = numpy.nan  # what ends the call, where the function raises
     if running.raised is None:
-        # a copy: C's own are gone when the function returns, whoever keeps them
+        # a copy, because C frees the array after the call
         at = numpy.array(numpy.frombuffer(ffi.buffer(positions, 24 * count), numpy.float64)).reshape(count, 3)
         at.flags.writeable = False
         found = numpy.asarray(running.function(at), numpy.float64)
@@ -633,7 +633,7 @@ class Grid(Handle, kind="vsh_grid"):
 
     @classmethod
     def from_meshes(cls, meshes: Meshes, *, run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
-        """The union of what meshes are taken for: solids, rooms, walls, sheets."""
+        """The union of the meshes as solids, rooms, walls and sheets (see mesh_solidity)."""
         return cls._of(call(lib.vsh_grid_from_meshes, *meshes_of(meshes), Filled("vsh_grid_options", options), OUT, run=run))
 
     @classmethod
@@ -729,7 +729,7 @@ def dense(box: Any, index_min: Optional[Sequence[int]], shape: Optional[Sequence
 
 
 def vdb_list(path: Path, *, run: Optional[Run] = None) -> List[types.VdbEntry]:
-    """What grids a .vdb file has, of any kind."""
+    """Lists the grids of a .vdb file, of any kind."""
     count, capacity = ffi.new("size_t *"), 16
     while True:
         entries = ffi.new("vsh_vdb_entry[]", capacity)
@@ -905,7 +905,7 @@ class Layer(Struct, kind="vsh_layer"):
 
 
 class Occluders(Handle, kind="vsh_occluders"):
-    """What casts: points, lightmaps, volumes, pictures and distances are asked of it.
+    """Everything that casts shadows. Points, lightmaps, volumes, pictures and distances are computed from it.
 
     Parameters
     ----------
@@ -925,14 +925,14 @@ class Occluders(Handle, kind="vsh_occluders"):
 
     @classmethod
     def from_grid(cls, grid: Grid, *, run: Optional[Run] = None, **options: "Unpack[types.FieldOptions]") -> "Occluders":
-        """A level set as what casts: of a .vdb file, a function, a procedural tree."""
+        """Casters made of a level set: of a .vdb file, a function or a procedural tree."""
         return cls._of(call(lib.vsh_occluders_from_grid, grid, Filled("vsh_field_options", options), OUT, run=run))
 
     @classmethod
     def from_parts(cls, field: Optional[Field] = None, *, triangles: Optional[Triangles] = None, layers: Sequence[Layer] = (),
                    true_triangles: Optional[Triangles] = None, true_solids: Optional[Solids] = None,
                    voxel_size: float = 0.0) -> "Occluders":
-        """Of a field, triangles, layers, and what errors are measured against."""
+        """Casters made of a field, triangles and layers. Errors are measured against true_triangles and true_solids."""
         parts = Filled("vsh_occluder_parts", field=field, triangles=triangles, layers=layers, true_triangles=true_triangles,
                        true_solids=true_solids, voxel_size=voxel_size)
         return cls._of(call(lib.vsh_occluders_from_parts, parts, OUT, keeps=parts.keeps))

@@ -62,7 +62,7 @@ class Atlas(Handle, kind="vsh_atlas"):
         return ask(lib.vsh_atlas_page_count, self)
 
     def page(self, index: int) -> types.AtlasPage:
-        """What a page comes to: its size (texels), texels_per_unit, share that is covered, first mesh."""
+        """A page's size in texels, its texels_per_unit, the covered share and its first mesh."""
         return ask(lib.vsh_atlas_page_view, self, index_of(index, self.pages, "page", "the atlas has"))
 
     @property
@@ -681,7 +681,7 @@ def flat_visibility(casters: Optional[Outline], light: Light, points: ArrayLike)
 
 
 def flat_light_name(type: int) -> Optional[str]:
-    """What a light of a type's number is in a plane: "directional", "disc", "spot"; None where there is none."""
+    """The name of a type of light in a plane: "directional", "disc" or "spot". None if no type has this number."""
     return ask(lib.vsh_get_name, lib.VSH_NAMES_FLAT_LIGHT, type)
 
 
@@ -778,7 +778,7 @@ def compare_coverage(golden: Optional[ArrayLike], values: Optional[ArrayLike]) -
 
 def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], masks: Optional[Sequence[ArrayLike]] = None, *,
                      run: Optional[Run] = None) -> types.Accuracy:
-    """How far planes of values, 0 … 1, are from their truths, together."""
+    """The error of planes of values (0 … 1) against their truths, over all planes."""
     if len(truths) != len(values) or (masks is not None and len(masks) != len(values)):
         raise ValueError(f"expected as many truths as values and masks, got {len(truths)} and {len(values)}")
     parts = [_compared(t, v, None if masks is None else masks[i]) for i, (t, v) in enumerate(zip(truths, values))]
@@ -786,7 +786,7 @@ def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], m
 
 
 class Limits:
-    """What a channel is allowed: `value` is a dict by measures' names; members of `options` as of compare().
+    """Limits of a channel: `value` is a dict by measures' names; members of `options` as of compare().
 
     Parameters
     ----------
@@ -821,14 +821,14 @@ class Tolerances(Handle, kind="vsh_tolerances"):
         super().__init__(call(lib.vsh_tolerances_read, path_of(path, "path"), OUT))
 
     def limits(self, channel: str) -> Tuple[Limits, float]:
-        """What it says of a channel, and the share of covered texels that may differ (NaN: nothing)."""
+        """The limits of a channel, and the share of covered texels that may differ (NaN: the file does not say)."""
         limits, coverage = Limits(), ffi.new("double *", float("nan"))
         ask(lib.vsh_tolerances_apply, self, channel, limits.struct, coverage)
         return limits, coverage[0]
 
 
 class Comparison:
-    """What came of comparing two files.
+    """The result of comparing two files.
 
     Attributes
     ----------

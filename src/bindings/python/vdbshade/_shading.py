@@ -280,17 +280,17 @@ _OUTPUT_SIZE = ffi.sizeof("vsh_query_output")
 
 
 def shadow_method_traits(method: str) -> List[str]:
-    """What a shadow method is like: "rays", "keeps_error", "triangles", "inner"."""
+    """The traits of a shadow method: "rays", "keeps_error", "triangles", "inner"."""
     return words_of_bits("VSH_METHOD_", lib.vsh_shadow_method_traits(constant("VSH_SHADOW_", method, "method")))
 
 
 def ao_method_traits(method: str) -> List[str]:
-    """What an AO method is like, likewise."""
+    """The traits of an AO method, as of shadow_method_traits()."""
     return words_of_bits("VSH_METHOD_", lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
 
 
 def shadow_method_resolve(method: str, has_triangles: bool) -> str:
-    """What "auto" comes to with triangles or without; every other method is itself."""
+    """The method that "auto" chooses with or without triangles. Returns any other method unchanged."""
     return word("VSH_SHADOW_", lib.vsh_shadow_method_resolve(constant("VSH_SHADOW_", method, "method"), has_triangles))
 
 
@@ -604,7 +604,7 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
                   invalid: bool = False, tint: "str | types.Tint | None" = None, ambient: Optional[Sequence[float]] = None,
                   out: Optional[Mapping[str, numpy.ndarray]] = None, run: Optional[Run] = None,
                   **options: "Unpack[types.ShadeOptions]") -> Lightmap:
-    """Shades the texels of charts into planes: "shadow.NAME" of each light, "A" (1 where a texel is valid), and what is asked for.
+    """Shades the texels of charts into planes: "shadow.NAME" of each light, "A" (1 where a texel is valid), and those of the options.
 
     Parameters
     ----------
