@@ -295,6 +295,35 @@ TEST(files_that_cannot_be_read_say_why) {
     refused("text.fbx", "hello, world", VSH_ERROR_READ, "damaged or cut short", "");
 }
 
+typedef struct watch {
+    double last, stop;
+    int calls;
+} watch;
+
+static int32_t watch_progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    assert_string_equal(stage, "load");
+    assert_true(fraction >= w->last && fraction <= 1.0);
+    w->last = fraction;
+    ++w->calls;
+    return fraction >= w->stop;
+}
+
+TEST(progress_rises_to_one_and_can_cancel_anywhere) {
+    static const double stops[] = {2.0, 0.0, 0.1, 0.5, 0.99, 1.0};
+    write_bytes("watch.obj", quad_obj, strlen(quad_obj));
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        watch w = {0.0, stops[i], 0};
+        vsh_run run = run_watched(watch_progress, &w);
+        OWNED(vsh_model) *model = NULL;
+        const vsh_result result = vsh_model_read(path_of("watch.obj").text, &run, &model, NULL);
+        assert_int_equal(result, stops[i] > 1.0 ? VSH_OK : VSH_ERROR_CANCELLED);
+        assert_int_equal(model == NULL, stops[i] <= 1.0);
+        assert_true(w.calls >= 1 && (stops[i] <= 1.0 || w.last == 1.0));
+    }
+    unlink(path_of("watch.obj").text);
+}
+
 /* Cuts a file at every length. What still reads must be a mesh that passes its check; formats that know their
  * own length must notice every cut that loses more than white space. */
 static void cut_everywhere(const char *name, const void *bytes, size_t size, bool knows_its_length) {

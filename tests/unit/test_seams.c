@@ -610,6 +610,21 @@ TEST(the_memory_limit_is_held_before_anything_moves) {
     assert_int_equal(stitch_noise(m, &run, before, other, &failure), VSH_ERROR_LIMIT);
 }
 
+typedef struct stopping {
+    double at;
+    double last;
+    int calls;
+} stopping;
+
+static int stop_at(void *user, const char *stage, double fraction) {
+    stopping *s = user;
+    assert_string_equal(stage, "seams");
+    assert_true(fraction >= s->last && fraction <= 1.0);
+    s->last = fraction;
+    ++s->calls;
+    return fraction >= s->at;
+}
+
 /* The same differences, as AO and as light. */
 TEST(differences_of_light_are_told_in_parts_of_the_brightest) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
@@ -624,6 +639,20 @@ TEST(differences_of_light_are_told_in_parts_of_the_brightest) {
     assert_true(fabs(of_ao.before - 0.02) < 1e-6 && fabs(of_light.before - 0.02) < 1e-6);
     assert_true(of_ao.after < 0.0004 && of_light.after < 0.0004);
     assert_true(of_light.places == of_ao.places && of_light.texels == of_ao.texels);
+}
+
+TEST(it_is_cancelled_wherever_it_is_and_tells_how_far_it_is) {
+    FREED charts_mesh *m = two_squares(37.0, 1.0);
+    FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
+    const double at[] = {0.0, 0.2, 0.5, 2.0};
+    for (size_t i = 0; i < sizeof at / sizeof at[0]; ++i) {
+        stopping s = {at[i], 0.0, 0};
+        vsh_run run = run_watched(stop_at, &s);
+        run.threads = 1;
+        const vsh_result result = stitch_noise(m, &run, ao, light, &failure);
+        assert_int_equal(result, at[i] > 1.0 ? VSH_OK : VSH_ERROR_CANCELLED);
+        assert_true(s.calls > 0 && (at[i] < 1.0 || s.last == 1.0));
+    }
 }
 
 TEST(options_out_of_range_are_refused) {

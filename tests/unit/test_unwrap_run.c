@@ -415,6 +415,47 @@ TEST(uvs_that_can_serve_are_kept) {
     assert_false(can_serve(&own));
 }
 
+typedef struct stopper {
+    const char *stage;
+    double at, last;
+    int stopped;
+} stopper;
+
+static int32_t stop(void *user, const char *stage, double fraction) {
+    stopper *s = user;
+    assert_true(fraction >= 0 && fraction <= 1);
+    if (strcmp(stage, s->stage) == 0) {
+        assert_true(fraction >= s->last);
+        s->last = fraction;
+        s->stopped |= fraction >= s->at;
+    }
+    return s->stopped;
+}
+
+TEST(it_can_be_cancelled_in_every_stage) {
+    FREED shape *s = lump(64);
+    const vsh_mesh mesh = shape_mesh(s, "lump");
+    const vsh_unwrap_options o = unwrap_into(256);
+    stopper where[] = {{"unwrap", 0.0, 0.0, 0},
+                       {"unwrap", 0.3, 0.0, 0},
+                       {"unwrap", 0.7, 0.0, 0},
+                       {"pack", 0.0, 0.0, 0},
+                       {"pack", 2.0, 0.0, 0}};
+    for (size_t i = 0; i < sizeof where / sizeof where[0]; ++i) {
+        const vsh_run run = run_watched(stop, &where[i]);
+        OWNED(vsh_atlas) *atlas = (void *)&where[i];
+        const vsh_result result = vsh_unwrap(&mesh, 1, &o, &run, &atlas, &failure);
+        if (where[i].at > 1) {
+            assert_int_equal(result, VSH_OK);
+            assert_true(where[i].last == 1.0);
+        } else {
+            assert_int_equal(result, VSH_ERROR_CANCELLED);
+            assert_non_null(strstr(failure.message, where[i].stage));
+            assert_null(atlas);
+        }
+    }
+}
+
 TEST(memory_is_kept_within_its_limit) {
     FREED shape *s = lump(64);
     const vsh_mesh mesh = shape_mesh(s, "lump");

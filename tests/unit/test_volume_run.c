@@ -198,6 +198,42 @@ TEST(samples_are_interpolated_between_voxels) {
 
 /* --- limits, bad input */
 
+typedef struct watch {
+    double last, stop;
+} watch;
+
+static int32_t watch_progress(void *user, const char *stage, double fraction) {
+    watch *w = user;
+    assert_string_equal(stage, "volume");
+    assert_true(fraction >= w->last && fraction <= 1.0);
+    w->last = fraction;
+    return fraction >= w->stop;
+}
+
+TEST(progress_goes_to_one_and_cancels_anywhere) {
+    OWNED(vsh_field) *field = field_of(ball(), 0.1, 4.0);
+    OWNED(vsh_voxels) *voxels = cube_of(2.0, 0.05);
+    const vsh_light light = sun(UP, 0.1);
+    const double stops[] = {2.0, 0.0, 0.3, 0.97, 1.0};
+    for (size_t i = 0; i < sizeof stops / sizeof stops[0]; ++i) {
+        watch w = {0.0, stops[i]};
+        vsh_run run = run_watched(watch_progress, &w);
+        run.threads = 2;
+        OWNED(vsh_volume) *volume = NULL;
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        const vsh_result result =
+            vsh_bake_volume(occluders_of(field), voxels, &light, 1, NULL, &run, &volume, &stats, &failure);
+        if (i == 0) {
+            assert_int_equal(result, VSH_OK);
+            assert_true(w.last == 1.0 && stats.samples > 0);
+        } else {
+            assert_int_equal(result, VSH_ERROR_CANCELLED);
+            assert_non_null(strstr(failure.message, "volume"));
+            assert_null(volume);
+        }
+    }
+}
+
 TEST(memory_is_estimated_before_it_is_taken) {
     vsh_grid *grid = grid_of(ball(), 0.1);
     vsh_run run = run_within(1000000);
