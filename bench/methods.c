@@ -5,8 +5,8 @@
  *   vsh_methods FILE.csv */
 #include "analytic.h"
 #include "common.h"
-#include "embree.h"
 #include "metrics.h"
+#include "packets.h"
 
 #include <math.h>
 #include <stdbool.h>

@@ -24,6 +24,7 @@ typedef struct watch {
 
 static int32_t progress(void *user, const char *stage, double fraction) {
     watch *w = user;
+    assert_true(fraction >= 0.0 && fraction <= 1.0);
     if (w->stage < 0 || strcmp(w->name, stage) != 0 || fraction < w->last) {
         ++w->stage;
         snprintf(w->name, sizeof w->name, "%s", stage);

@@ -119,45 +119,63 @@ void truth_mesh_free(truth_mesh *truth) {
     free(truth);
 }
 
-/* Whether rays of a point meet the backs of triangles. */
+/* Rays of each point: those to a light, or over the hemisphere around the normal. */
 typedef struct work {
     const truth_mesh *truth;
     const double *origins;
     const float *normals;
+    const double *towards; /* of a light; NULL: the hemisphere */
+    double w;              /* of a light: radius at unit distance */
+    float distance;
     size_t rays;
-    float *backs;
+    bool (*counts)(const truth_mesh *truth, struct RTCRay ray); /* whether a ray adds to the share */
+    float *shares;
 } work;
 
-static bool meets_back(const work *job, size_t point, const double direction[3]) {
+static bool is_free(const truth_mesh *truth, struct RTCRay ray) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    const double *origin = &job->origins[3 * point], *center = job->truth->center;
-    struct RTCRayHit hit = {.ray = {.org_x = (float)(origin[0] - center[0]),
-                                    .org_y = (float)(origin[1] - center[1]),
-                                    .org_z = (float)(origin[2] - center[2]),
-                                    .dir_x = (float)direction[0],
-                                    .dir_y = (float)direction[1],
-                                    .dir_z = (float)direction[2],
-                                    .tfar = INFINITY,
-                                    .mask = 0xffffffffU},
-                            .hit.geomID = RTC_INVALID_GEOMETRY_ID};
-    rtcIntersect1(job->truth->scene, &context, &hit);
+    rtcOccluded1(truth->scene, &context, &ray);
+    return ray.tfar >= 0.0F; /* a hit sets it to -∞ */
+}
+
+static bool meets_back(const truth_mesh *truth, struct RTCRay ray) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    struct RTCRayHit hit = {.ray = ray, .hit.geomID = RTC_INVALID_GEOMETRY_ID};
+    rtcIntersect1(truth->scene, &context, &hit);
     return hit.hit.geomID != RTC_INVALID_GEOMETRY_ID &&
            hit.hit.Ng_x * hit.ray.dir_x + hit.hit.Ng_y * hit.ray.dir_y + hit.hit.Ng_z * hit.ray.dir_z > 0.0F;
 }
 
-static void count_backs(void *user, size_t begin, size_t end) {
+static void count_rays(void *user, size_t begin, size_t end) {
     const work *job = user;
     for (size_t point = begin; point < end; point++) {
-        const float *n = &job->normals[3 * point];
-        const truth_frame frame = truth_frame_around((double[]){n[0], n[1], n[2]});
-        size_t backs = 0;
+        const double *origin = &job->origins[3 * point], *center = job->truth->center;
+        const float *n = job->normals != NULL ? &job->normals[3 * point] : NULL;
+        const truth_frame frame =
+            truth_frame_around(job->towards != NULL ? job->towards : (double[]){n[0], n[1], n[2]});
+        size_t count = 0;
         for (size_t i = 0; i < job->rays; i++) {
-            double direction[3];
-            truth_cosine_direction(&frame, i, job->rays, direction);
-            backs += meets_back(job, point, direction);
+            double d[3];
+            if (job->towards != NULL) {
+                truth_light_direction(&frame, job->w, i, job->rays, d);
+            } else {
+                truth_cosine_direction(&frame, i, job->rays, d);
+            }
+            const struct RTCRay ray = {.org_x = (float)(origin[0] - center[0]),
+                                       .org_y = (float)(origin[1] - center[1]),
+                                       .org_z = (float)(origin[2] - center[2]),
+                                       .dir_x = (float)d[0],
+                                       .dir_y = (float)d[1],
+                                       .dir_z = (float)d[2],
+                                       .tfar = job->distance,
+                                       .mask = 0xffffffffU};
+            const bool hidden =
+                job->towards != NULL && n != NULL && d[0] * n[0] + d[1] * n[1] + d[2] * n[2] <= 0.0;
+            count += !hidden && job->counts(job->truth, ray);
         }
-        job->backs[point] = (float)((double)backs / (double)job->rays);
+        job->shares[point] = (float)((double)count / (double)job->rays);
     }
 }
 
@@ -199,20 +217,18 @@ int truth_in_pieces(size_t count, int threads, void (*body)(void *user, size_t b
 
 int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                      const double towards[3], double w, size_t rays, int threads, float *visible) {
-    const truth_question question = {
-        .count = count, .origins = origins, .normals = normals, .towards = towards, .w = w, .rays = rays};
-    return truth_mesh_packets(truth, TRUTH_LONE_RAYS, &question, threads, visible);
+    work job = {truth, origins, normals, towards, w, INFINITY, rays, is_free, visible};
+    return truth_in_pieces(count, threads, count_rays, &job);
 }
 
 int truth_mesh_ao(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                   double distance, size_t rays, int threads, float *open) {
-    const truth_question question = {
-        .count = count, .origins = origins, .normals = normals, .distance = distance, .rays = rays};
-    return truth_mesh_packets(truth, TRUTH_LONE_RAYS, &question, threads, open);
+    work job = {truth, origins, normals, NULL, 0.0, (float)distance, rays, is_free, open};
+    return truth_in_pieces(count, threads, count_rays, &job);
 }
 
 int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                      size_t rays, int threads, float *backs) {
-    work job = {truth, origins, normals, rays, backs};
-    return truth_in_pieces(count, threads, count_backs, &job);
+    work job = {truth, origins, normals, NULL, 0.0, INFINITY, rays, meets_back, backs};
+    return truth_in_pieces(count, threads, count_rays, &job);
 }

@@ -1,4 +1,4 @@
-/* What the two files on Embree share. */
+/* What embree.c and the benchmarks share. */
 #ifndef TRUTH_EMBREE_SCENE_H
 #define TRUTH_EMBREE_SCENE_H
 

@@ -181,9 +181,9 @@ static void turn_about(int axis, double angle, double v[3]) {
 
 /* The plate of grazing_light_reaches_an_open_plate() as triangles. */
 static vsh_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, double angle) {
-    truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0};
-    memcpy(box.half, node->size, sizeof box.half);
-    vsh_mesh mesh = mesh_of_solid(&box);
+    float corners[24];
+    const double low[3] = {-node->size[0], -node->size[1], -node->size[2]};
+    vsh_mesh mesh = box_mesh(corners, low, node->size);
     double transform[12] = {0};
     for (int column = 0; column < 3; ++column) {
         double v[3] = {column == 0, column == 1, column == 2};
@@ -195,8 +195,6 @@ static vsh_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, do
     mesh.transform = transform;
     vsh_triangles *triangles = NULL;
     assert_int_equal(vsh_triangles_create(&mesh, 1, NULL, &triangles, NULL), VSH_OK);
-    free((void *)(uintptr_t)mesh.positions);
-    free((void *)(uintptr_t)mesh.indices);
     return triangles;
 }
 

@@ -272,22 +272,11 @@ TEST(files_of_the_input_are_not_replaced_but_others_named) {
     remove_file("all.bin");
 }
 
-static int32_t stop(void *user, const char *stage, double fraction) {
-    return fraction >= *(double *)user;
-}
-
-TEST(limits_and_cancelling_leave_the_old_file) {
+TEST(limits_leave_the_old_file) {
     FREED_BY(end_lighting) lighting l = begin_sound();
     vsh_run run = vsh_run_default();
     for (run.memory_limit = 1000; run.memory_limit < 100000; run.memory_limit *= 3) {
         assert_fails(write_in(&l, &run), VSH_ERROR_LIMIT, "");
-        assert_refused(failure.code, "");
-    }
-    run.memory_limit = 0;
-    run.progress = stop;
-    for (double fraction = 0.0; fraction < 0.9; fraction += 0.2) {
-        run.user = &fraction;
-        assert_fails(write_in(&l, &run), VSH_ERROR_CANCELLED, "");
         assert_refused(failure.code, "");
     }
 }

@@ -193,7 +193,7 @@ TEST(a_far_lamp_is_a_sun) {
         cast_shadows(&c, &l, method, COUNT, positions, normals, far);
         const truth_metrics m = truth_compare(COUNT, far, values, NULL);
         /* a texel of a quarter of a million is one ray, or one edge, that rounds to the other side */
-        assert_true(m.rmse < 1e-3);
+        assert_true(m.rmse < 1e-3 && (method > VSH_SHADOW_CONE || m.max <= 1e-3));
     }
 }
 

@@ -173,7 +173,8 @@ TEST(memory_is_held_against_the_limit) {
     vsh_run run = vsh_run_default();
     OWNED(vsh_model) *model = NULL;
     run.memory_limit = 1000000;
-    assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT,
+                 "limit.obj");
     assert_null(model);
     run.memory_limit = 3000000;
     assert_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));

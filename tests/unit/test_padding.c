@@ -56,21 +56,6 @@ TEST(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones) {
     }
 }
 
-TEST(a_ring_is_exactly_as_wide_as_asked) {
-    enum { SIZE = 41, PADDING = 5 };
-    uint8_t states[SIZE * SIZE] = {0};
-    float values[SIZE * SIZE];
-    states[20 * SIZE + 20] = VSHI_TEXEL_VALID;
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        values[i] = states[i] == VSHI_TEXEL_VALID ? 3.0f : HOLE;
-    }
-    fill(NULL, SIZE, SIZE, states, PADDING, 0, values, 1);
-    for (int i = 0; i < SIZE * SIZE; ++i) {
-        const int dx = i % SIZE - 20, dy = i / SIZE - 20;
-        assert_true(values[i] == (dx * dx + dy * dy <= PADDING * PADDING ? 3.0f : HOLE));
-    }
-}
-
 /* A dark texel beside a lit one keeps its value and hands it on, of all channels; the states stays. */
 TEST(dark_texels_are_no_holes_and_all_channels_are_copied) {
     uint8_t states[16] = {0}, before[16];
@@ -86,22 +71,6 @@ TEST(dark_texels_are_no_holes_and_all_channels_are_copied) {
     for (int i = 0; i < 3 * 16; ++i) {
         const int texel = i / 3;
         assert_true(values[i] == (texel < 2 || texel > 9 ? HOLE : texel <= 5 ? 0.0f : 1.0f + (float)(i % 3)));
-    }
-}
-
-TEST(any_number_of_threads_gives_the_same_bits) {
-    enum { WIDTH = 300, HEIGHT = 211, COUNT = WIDTH * HEIGHT };
-    static const int32_t threads[] = {1, 2, 5};
-    static uint8_t states[COUNT];
-    static float values[3][COUNT];
-    for (int t = 0; t < 3; ++t) {
-        for (uint32_t i = 0; i < COUNT; ++i) {
-            states[i] = i * 2654435761u >> 26 == 0 ? VSHI_TEXEL_VALID : VSHI_TEXEL_EMPTY;
-            values[t][i] = (float)i;
-        }
-        vsh_run run = run_on(threads[t]);
-        fill(&run, WIDTH, HEIGHT, states, 9, 0, values[t], 1);
-        assert_memory_equal(values[0], values[t], sizeof values[0]);
     }
 }
 

@@ -121,23 +121,6 @@ TEST(values_follow_points_that_are_shuffled_on_any_number_of_threads) {
     }
 }
 
-/* The order tells its samplers the points' numbers, where there are no texels. */
-TEST(points_without_texels_are_told_apart_by_their_numbers_in_any_order) {
-    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.1, 0.0);
-    vsh_shade_options options = preview_options();
-    options.method = VSH_SHADOW_RAYS;
-    options.ao_method = VSH_AO_RAYS;
-    options.rays = 2;
-    OWNED(vsh_query) *query = query_of(occluders_of(c.field), lights, LIGHTS, &options);
-    const vsh_points points = {MANY, shuffled_positions, shuffled_normals, NULL};
-    ask(query, &points, 2);
-    for (int l = 0; l <= LIGHTS; ++l) {
-        expect(&c, &points, l, &options);
-        assert_memory_equal(expected, values[l], sizeof expected);
-    }
-    assert_memory_equal(expected_deviation, deviations[LIGHTS], sizeof expected);
-}
-
 TEST(points_that_are_invalid_are_nan_and_leave_the_others_alone) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
     const vsh_shade_options preview = preview_options(); /* rays of adaptive are shared with neighbours */
@@ -258,12 +241,7 @@ TEST(a_handle_is_shared_by_threads) {
     }
 }
 
-static int32_t stop_at(void *user, const char *stage, double fraction) {
-    assert_string_equal(stage, "query");
-    return fraction >= *(const double *)user;
-}
-
-TEST(limits_and_cancelling_have_their_codes) {
+TEST(the_memory_limit_is_held) {
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
     OWNED(vsh_query) *query = query_of(occluders_of(field), lights, LIGHTS, NULL);
     float *const visibility[LIGHTS] = {values[0], NULL};
@@ -277,15 +255,6 @@ TEST(limits_and_cancelling_have_their_codes) {
                  "query");
     run.memory_limit = info.bytes + 16 * MANY + 4096;
     assert_ok(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure));
-    run.memory_limit = 0;
-    const double stops[] = {0.0, 0.1, 0.5};
-    for (int i = 0; i < 3; ++i) {
-        double stop = stops[i];
-        run.progress = stop_at;
-        run.user = &stop;
-        assert_fails(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure),
-                     VSH_ERROR_CANCELLED, "");
-    }
 }
 
 TEST(bad_arguments_are_refused_by_name) {

@@ -1,5 +1,5 @@
-/* Rectangular area lights among horizons, layers, casters without voxels, threads and irradiance; and what is
- * no rectangle. */
+/* Rectangular area lights among horizons, layers, casters without voxels, and irradiance; and what is no
+ * rectangle. */
 #include "rectangles.h"
 #include "testing.h"
 
@@ -58,27 +58,6 @@ TEST(layers_know_it) {
         others += layered[i] != whole[i];
     }
     assert_true(others <= 2);
-}
-
-TEST(threads_and_instruction_sets_give_the_same_bits) {
-    const casting *c = *state;
-    const vsh_points points = {COUNT, positions, normals, NULL};
-    float values[COUNT], others[COUNT];
-    for (int32_t method = VSH_SHADOW_HARD; method < SHADOW_METHODS; ++method) {
-        const vsh_light light = light_of(method % LIGHTS);
-        const vsh_shade_options options = options_of(method);
-        vsh_run run = run_on(1);
-        run.isa = VSH_ISA_BASE;
-        assert_int_equal(vsh_shade_shadow(occluders_of_caster(c), &points, &light, &options, &run, values,
-                                          NULL, NULL, NULL),
-                         VSH_OK);
-        run.threads = 3;
-        run.isa = VSH_ISA_BEST;
-        assert_int_equal(vsh_shade_shadow(occluders_of_caster(c), &points, &light, &options, &run, others,
-                                          NULL, NULL, NULL),
-                         VSH_OK);
-        assert_memory_equal(values, others, sizeof values);
-    }
 }
 
 static float red_at(const vsh_light *light, const double *at) {

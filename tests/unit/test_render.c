@@ -197,35 +197,7 @@ TEST(who_looks_from_within_sees_out) {
 
 /* --- what holds for all */
 
-TEST(threads_and_instruction_sets_change_no_bit) {
-    static float first[3 * PIXELS];
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.05, 0.0);
-    const vsh_surface surface = {field, {0.5, 0.5, 0.5}};
-    vsh_render_options o = small(camera_at(3.0, 3.0, 4.0, 0.0, 0.5, 0.0, 40.0), 2);
-    const vsh_light light = sun(truth_seeds_sun, 0.2);
-    o.ao = 1;
-    o.shafts = 0.3;
-    o.shaft_steps = 3;
-    const struct { int32_t threads, isa; } runs[] = {{1, VSH_ISA_BASE}, {3, VSH_ISA_BASE}, {2, VSH_ISA_BEST}};
-    for (size_t i = 0; i < sizeof runs / sizeof runs[0]; ++i) {
-        vsh_run run = run_on(runs[i].threads);
-        run.isa = runs[i].isa;
-        render(&surface, 1, field, &light, &o, &run);
-        if (i == 0) {
-            memcpy(first, color, sizeof first);
-        }
-        assert_memory_equal(first, color, sizeof first);
-    }
-}
-
-static int32_t stop(void *user, const char *stage, double fraction) {
-    double *seen = user;
-    assert_true(fraction >= *seen && fraction <= 1.0);
-    *seen = fraction;
-    return fraction > 0.3;
-}
-
-TEST(what_is_out_of_range_cancelled_or_limited_is_refused) {
+TEST(what_is_out_of_range_or_limited_is_refused) {
     OWNED(vsh_field) *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
     const vsh_occluders *casters = occluders_of(field);
     const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}},
@@ -251,18 +223,7 @@ TEST(what_is_out_of_range_cancelled_or_limited_is_refused) {
                  VSH_ERROR_ARGUMENT, "");
     assert_fails(vsh_render(&none, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
-    assert_fails(vsh_render(&surface, 1, casters, NULL, 1, &good, NULL, &picture, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "");
-    assert_fails(vsh_render(&surface, 1, NULL, NULL, 0, &good, NULL, &picture, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "");
-    vsh_run run = vsh_run_default();
-    double seen = 0.0;
-    run.progress = stop;
-    run.user = &seen;
-    assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
-                 VSH_ERROR_CANCELLED, "");
-    run = vsh_run_default();
-    run.memory_limit = 100000;
+    const vsh_run run = run_within(100000);
     assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),
                  VSH_ERROR_LIMIT, "");
 }

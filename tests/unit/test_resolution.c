@@ -7,11 +7,8 @@ enum { POINTS = 400 };
 
 /* A plate of 2 × 2, 0.2 thick, whose top is at y = 1. */
 static vsh_mesh plate(void) {
-    static const float positions[] = {-1, 1,    -1, 1, 1,    -1, 1, 1,    1, -1, 1,    1,
-                                      -1, 0.8f, -1, 1, 0.8f, -1, 1, 0.8f, 1, -1, 0.8f, 1};
-    static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
-                                       1, 2, 6, 1, 6, 5, 2, 3, 7, 2, 7, 6, 3, 0, 4, 3, 4, 7};
-    return (vsh_mesh){.positions = positions, .vertex_count = 8, .indices = indices, .triangle_count = 12};
+    static float corners[24];
+    return box_mesh(corners, (const double[]){-1.0, 0.8, -1.0}, (const double[]){1.0, 1.0, 1.0});
 }
 
 static vsh_occluders *plate_of(int32_t resolution) {

@@ -530,21 +530,17 @@ TEST(one_of_several_changes_as_it_does_alone) {
     m->mesh.transform = away;
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
     FREED float *alone = new_plane(0.5f), *among = new_plane(0.5f);
-    for (int32_t threads = 0; threads <= 4; ++threads) {
-        FREED_BY(free_pages) two_pages p;
-        make_pages(&p, WHOLE, 2);
-        uint32_t seed = 9;
-        for (size_t t = 0; t < TEXELS; ++t) {
-            *(threads == 0 ? &alone[t] : &among[t]) = random_value(&seed);
-        }
-        const vsh_lightmap map = {.ao = threads == 0 ? alone : among};
-        const vsh_stitch_page pages[3] = {p.pages[0], {charts, &map}, p.pages[1]};
-        const vsh_run run = run_on(threads);
-        assert_int_equal(threads == 0 ? vsh_lightmap_stitch(charts, &map, 0, NULL, NULL, NULL, NULL)
-                                      : vsh_lightmaps_stitch(pages, 3, 0, NULL, &run, NULL, NULL),
-                         VSH_OK);
-        assert_true(threads == 0 || memcmp(alone, among, TEXELS * sizeof *alone) == 0);
+    FREED_BY(free_pages) two_pages p;
+    make_pages(&p, WHOLE, 2);
+    uint32_t seed = 9;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        alone[i] = among[i] = random_value(&seed);
     }
+    const vsh_lightmap of_one = {.ao = alone}, of_three = {.ao = among};
+    const vsh_stitch_page pages[3] = {p.pages[0], {charts, &of_three}, p.pages[1]};
+    assert_ok(vsh_lightmap_stitch(charts, &of_one, 0, NULL, NULL, NULL, &failure));
+    assert_ok(vsh_lightmaps_stitch(pages, 3, 0, NULL, NULL, NULL, &failure));
+    assert_memory_equal(alone, among, TEXELS * sizeof *alone);
 }
 
 TEST(pages_of_other_planes_are_refused) {
@@ -561,7 +557,7 @@ TEST(pages_of_other_planes_are_refused) {
     assert_ok(vsh_lightmaps_stitch(NULL, 0, 0, NULL, NULL, NULL, &failure));
 }
 
-/* --- threads, memory, cancelling, options, and which planes change */
+/* --- memory, options, and which planes change */
 
 static vsh_result stitch_noise(const charts_mesh *m, const vsh_run *run, float *ao, float *light,
                                vsh_error *error) {
@@ -575,18 +571,6 @@ static vsh_result stitch_noise(const charts_mesh *m, const vsh_run *run, float *
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
     const vsh_lightmap map = {.ao = ao, .irradiance = light};
     return vsh_lightmap_stitch(charts, &map, 0, NULL, run, NULL, error);
-}
-
-TEST(any_number_of_threads_gives_the_same_bits) {
-    FREED charts_mesh *m = two_squares(37.0, 1.0);
-    static float ao[2][TEXELS], light[2][3 * TEXELS];
-    for (int32_t threads = 1; threads <= 8; ++threads) {
-        const int own = threads > 1;
-        const vsh_run run = run_on(threads);
-        assert_ok(stitch_noise(m, &run, ao[own], light[own], &failure));
-        assert_memory_equal(ao[own], ao[0], sizeof ao[0]);
-        assert_memory_equal(light[own], light[0], sizeof light[0]);
-    }
 }
 
 TEST(the_memory_limit_is_held_before_anything_moves) {

@@ -261,30 +261,6 @@ TEST(a_point_near_the_shadow_sees_less_of_larger_lights) {
     }
 }
 
-TEST(a_larger_occluder_hides_more) {
-    const double up[3] = {0.0, 1.0, 0.0};
-    const vsh_light light = sun(up, RADIANS(20.0));
-    float last[VSH_SHADOW_CONE + 1][8];
-    for (int32_t method = 0; method <= VSH_SHADOW_CONE; ++method) {
-        for (int i = 0; i < 8; ++i) {
-            last[method][i] = 1.0f;
-        }
-    }
-    for (double radius = 0.1; radius < 1.2; radius += 0.05) {
-        const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, radius, 0.0};
-        OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, 0.03, 0.0);
-        for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-            for (int i = 0; i < 8; ++i) {
-                const double p[3] = {0.15 * i, -2.0, 0.02 * i};
-                const float v = shadow_at(field, &light, method, p, NULL);
-                assert_true(v <= last[method][i] + 1e-3f);
-                last[method][i] = v;
-            }
-        }
-    }
-    assert_true(last[VSH_SHADOW_CONE][0] == 0.0f);
-}
-
 /* practical is classic through a smoothstep, but for what its march no longer looks at. */
 TEST(practical_is_classic_smoothed) {
     enum { COUNT = 64 * 64 };
@@ -381,57 +357,6 @@ TEST(a_light_without_size_is_hard_in_every_method) {
             sized.radius = 0.3;
             shadows(field, &sized, VSH_SHADOW_HARD, COUNT, positions, n, soft);
             assert_memory_equal(hard, soft, sizeof hard);
-        }
-    }
-}
-
-TEST(a_far_sphere_light_is_a_directional_one) {
-    enum { COUNT = 64 * 64 };
-    static double positions[3 * COUNT];
-    static float normals[3 * COUNT], far[COUNT], directional[COUNT];
-    floor_texels(64, positions, normals);
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
-    const double half = atan(truth_seeds_w), away = 1e6;
-    const double length = sqrt(0.25 + 0.36 + 0.36);
-    double place[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        place[axis] = away * truth_seeds_sun[axis] / length;
-    }
-    const vsh_light s = sun(truth_seeds_sun, 2.0 * half), l = lamp(place, away * sin(half));
-    for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-        shadows(field, &s, method, COUNT, positions, normals, directional);
-        shadows(field, &l, method, COUNT, positions, normals, far);
-        for (size_t i = 0; i < COUNT; ++i) {
-            assert_true(fabsf(far[i] - directional[i]) <= 1e-3f);
-        }
-    }
-}
-
-TEST(a_light_inside_a_caster_lights_nothing) {
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
-    const double places[2][3] = {{0.0, 0.8, 0.0}, {-1.2, 0.7, 0.5}}; /* in the sphere, in the rounded box */
-    uint64_t counter = 4;
-    for (int place = 0; place < 2; ++place) {
-        for (double radius = 0.0; radius < 0.25; radius += 0.08) {
-            const vsh_light light = lamp(places[place], radius);
-            for (int i = 0; i < 200; ++i) {
-                const double p[3] = {between(&counter, -2.5, 2.5), 0.001, between(&counter, -2.5, 2.5)};
-                for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-                    assert_true(shadow_at(field, &light, method, p, UP) == 0.0f);
-                }
-            }
-        }
-    }
-}
-
-TEST(a_point_inside_a_sphere_light_sees_all_of_it) {
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
-    const double place[3] = {1.0, 1.2, 1.0};
-    const vsh_light light = lamp(place, 0.5);
-    const double points[3][3] = {{1.0, 1.2, 1.0}, {1.0, 1.0, 1.3}, {1.0, 1.2 - 0.499, 1.0}};
-    for (int i = 0; i < 3; ++i) {
-        for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
-            assert_true(shadow_at(field, &light, method, points[i], NULL) == 1.0f);
         }
     }
 }

@@ -1,4 +1,4 @@
-/* How shadows are computed: the same bits however they are run, work that is counted, bad input. */
+/* How shadows are computed: work that is counted, and bad input. */
 #include "previews.h"
 #include "shading.h"
 #include "testing.h"
@@ -27,35 +27,6 @@ static vsh_result shade(const vsh_field *field, const vsh_light *light, const vs
                         const vsh_run *run, float *values, vsh_shade_stats *stats) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     return vsh_shade_shadow(occluders_of(field), &points, light, options, run, values, NULL, stats, &failure);
-}
-
-TEST(neither_threads_nor_neighbours_show_in_the_bits) {
-    static float first[COUNT], other[COUNT];
-    fill_points();
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
-    const double place[3] = {1.0, 1.5, 1.0};
-    const vsh_light lights[2] = {sun(truth_seeds_sun, 0.2), lamp(place, 0.2)};
-    for (int l = 0; l < 2; ++l) {
-        for (int32_t method = 0; method < METHODS; ++method) {
-            vsh_shade_options options = preview_options();
-            options.method = method;
-            const int32_t threads[] = {1, 2, 5};
-            vsh_shade_stats stats[3];
-            for (int i = 0; i < 3; ++i) {
-                const vsh_run run = run_on(threads[i]);
-                stats[i] = vsh_shade_stats_zero();
-                assert_ok(shade(field, &lights[l], &options, &run, i == 0 ? first : other, &stats[i]));
-                if (i > 0) {
-                    assert_memory_equal(first, other, sizeof first);
-                    assert_memory_equal(&stats[0], &stats[i], sizeof stats[0]);
-                }
-            }
-            for (size_t i = 0; i < COUNT; i += 61) { /* one at a time */
-                const float v = shadow_at(field, &lights[l], method, positions + 3 * i, normals + 3 * i);
-                assert_int_equal(bits_of(v), bits_of(first[i]));
-            }
-        }
-    }
 }
 
 TEST(every_point_is_marched_skipped_certified_or_invalid) {
@@ -112,30 +83,6 @@ TEST(points_turned_away_are_0_and_skipped_not_marched) {
     }
 }
 
-TEST(points_without_place_or_normal_are_nan_and_counted) {
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.1, 0.0);
-    const double nan = (double)NAN, inf = (double)INFINITY;
-    const double p[6][3] = {{nan, 0.0, 0.0}, {0.0, inf, 0.0}, {0.0, 0.0, -inf},
-                            {0.0, 5.0, 0.0}, {0.0, 5.0, 0.0}, {0.0, 5.0, 0.0}};
-    const float n[6][3] = {{0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f},       {0.0f, 1.0f, 0.0f},
-                           {0.0f, 0.0f, 0.0f}, {0.0f, (float)NAN, 0.0f}, {(float)INFINITY, 0.0f, 0.0f}};
-    const vsh_light light = sun(truth_seeds_sun, 0.2);
-    for (int32_t method = 0; method < METHODS; ++method) {
-        float v[6];
-        vsh_shade_stats stats = shadows(field, &light, method, 6, &p[0][0], &n[0][0], v);
-        assert_int_equal(stats.invalid, 6);
-        assert_int_equal(stats.marches, 0);
-        for (int i = 0; i < 6; ++i) {
-            assert_true(isnan(v[i]));
-        }
-        stats = shadows(field, &light, method, 6, &p[0][0], NULL, v);
-        assert_int_equal(stats.invalid, 3);
-        for (int i = 0; i < 6; ++i) {
-            assert_int_equal(isnan(v[i]) != 0, i < 3);
-        }
-    }
-}
-
 TEST(running_out_of_steps_is_counted_and_stays_in_range) {
     static float visible[COUNT];
     floor_texels(SIDE, positions, normals);
@@ -167,12 +114,7 @@ TEST(cones_wider_than_the_reach_are_counted) {
     assert_int_equal(stats.beyond_reach, 0);
 }
 
-static int32_t stop_at(void *user, const char *stage, double fraction) {
-    assert_string_equal(stage, "shadow.sun");
-    return fraction >= *(const double *)user;
-}
-
-TEST(options_lights_and_cancelling_have_their_codes) {
+TEST(bad_options_and_lights_are_refused) {
     static float visible[COUNT];
     floor_texels(SIDE, positions, normals);
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.2, 1.0);
@@ -192,11 +134,6 @@ TEST(options_lights_and_cancelling_have_their_codes) {
         assert_fails(shade(field, &light, &o[i], NULL, visible, NULL), VSH_ERROR_ARGUMENT, parts[i]);
     }
     assert_fails(shade(field, &inverted, NULL, NULL, visible, NULL), VSH_ERROR_ARGUMENT, "angle");
-    double stops[] = {0.0, 0.1, 0.5};
-    for (int i = 0; i < 3; ++i) {
-        vsh_run run = run_watched(stop_at, &stops[i]);
-        assert_fails(shade(field, &light, NULL, &run, visible, NULL), VSH_ERROR_CANCELLED, "");
-    }
     const vsh_points none = {0, NULL, NULL, NULL};
     assert_ok(vsh_shade_shadow(occluders_of(field), &none, &light, NULL, NULL, NULL, NULL, NULL, &failure));
     assert_true(shadow_at(field, &light, VSH_SHADOW_CONE, (const double[]){0.0, 9.0, 0.0}, UP) == 1.0f);

@@ -255,10 +255,6 @@ TEST(plate_that_voxels_lose_has_no_surface) {
     assert_null(field->surface);
 }
 
-static int32_t cancel_surface(void *user, const char *stage, double fraction) {
-    return fraction > *(const double *)user;
-}
-
 TEST(surface_keeps_the_limit_and_ends_when_asked) {
     OWNED(vsh_grid) *grid = grid_of(truth_seeds(), VOXEL);
     vsh_field *field = NULL;
@@ -271,11 +267,5 @@ TEST(surface_keeps_the_limit_and_ends_when_asked) {
     run.memory_limit = 2 * (info.bytes + voxels.bytes);
     assert_int_equal(make(grid, &run, &field, &failure), VSH_ERROR_LIMIT);
     assert_non_null(strstr(failure.message, "surface"));
-    assert_null(field);
-    run.memory_limit = 0;
-    run.progress = cancel_surface;
-    double most = 0.5;
-    run.user = &most;
-    assert_int_equal(make(grid, &run, &field, &failure), VSH_ERROR_CANCELLED);
     assert_null(field);
 }

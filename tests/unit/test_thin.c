@@ -32,13 +32,13 @@ static void turn_by(double turn, const double v[3], double out[3]) {
 /* The same as triangles. */
 static vsh_triangles *triangles_of_blocks(const block *blocks, int count, double turn, const double by[3]) {
     vsh_mesh meshes[8];
+    float corners[8][24];
     double transforms[8][12];
     vsh_triangles *triangles = NULL;
     for (int i = 0; i < count; ++i) {
-        truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.0, 0.0};
+        const double *h = blocks[i].half, low[3] = {-h[0], -h[1], -h[2]};
         double centre[3];
-        memcpy(box.half, blocks[i].half, sizeof box.half);
-        meshes[i] = mesh_of_solid(&box);
+        meshes[i] = box_mesh(corners[i], low, h);
         turn_by(turn, blocks[i].centre, centre);
         for (int axis = 0; axis < 3; ++axis) {
             const double unit[3] = {axis == 0, axis == 1, axis == 2};
@@ -52,10 +52,6 @@ static vsh_triangles *triangles_of_blocks(const block *blocks, int count, double
         meshes[i].transform = transforms[i];
     }
     assert_ok(vsh_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure));
-    for (int i = 0; i < count; ++i) {
-        free((void *)(uintptr_t)meshes[i].positions);
-        free((void *)(uintptr_t)meshes[i].indices);
-    }
     return triangles;
 }
 

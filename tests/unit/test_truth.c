@@ -251,19 +251,12 @@ TEST(culling_changes_nothing) {
     assert_true(penumbra > 10.0);
 }
 
-/* A box of triangles, -1 … 1, outward. */
-static const float box_positions[] = {-1, -1, -1, 1, -1, -1, -1, 1, -1, 1, 1, -1,
-                                      -1, -1, 1,  1, -1, 1,  -1, 1, 1,  1, 1, 1};
-static const uint32_t box_indices[] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
-                                       2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-
+/* A box of triangles, -1 … 1. */
 static vsh_mesh turned_box(const double *transform) {
-    return (vsh_mesh){.name = "box",
-                      .positions = box_positions,
-                      .indices = box_indices,
-                      .vertex_count = 8,
-                      .triangle_count = 12,
-                      .transform = transform};
+    static float corners[24];
+    vsh_mesh mesh = box_mesh(corners, (const double[]){-1.0, -1.0, -1.0}, (const double[]){1.0, 1.0, 1.0});
+    mesh.transform = transform;
+    return mesh;
 }
 
 enum { POINTS = 600, RAYS = 256 };
@@ -321,37 +314,6 @@ TEST(mesh_and_analytic_truth_agree_on_a_box) {
         float seen = 0.0F;
         assert_int_equal(truth_mesh_backs(truth, 1, inside, side, RAYS, 1, &seen), 0);
         near_value(seen, 1.0, 0.0, "backs inside of a box");
-    }
-}
-
-/* A yardstick that traced other rays, or fewer, would be no yardstick. */
-TEST(packets_answer_as_lone_rays_do_for_any_threads) {
-    enum { FEW = 37 }; /* no multiple of a packet */
-    static receivers points;
-    static float lone[POINTS], values[POINTS];
-    const double transform[12] = {0.5, 0.0, 0.0, 0.0, 0.0, 0.4, 0.0, 1.0, 0.0, 0.0, 0.3, 0.0};
-    const vsh_mesh mesh = turned_box(transform);
-    OWNED(truth_mesh) *truth = truth_mesh_create(&mesh, 1);
-    assert_non_null(truth);
-    place(&points, origin);
-    for (int ao = 0; ao < 2; ao++) {
-        const truth_question question = {.count = POINTS,
-                                         .origins = points.positions,
-                                         .normals = points.normals,
-                                         .towards = ao ? NULL : truth_seeds_sun,
-                                         .w = 0.2,
-                                         .distance = 1.5,
-                                         .rays = FEW};
-        assert_int_equal(truth_mesh_packets(truth, TRUTH_LONE_RAYS, &question, 1, lone), 0);
-        for (int packing = 0; packing < TRUTH_PACKINGS; packing++) {
-            memset(values, 0, sizeof values);
-            assert_int_equal(truth_mesh_packets(truth, packing, &question, 5, values), 0);
-            const truth_metrics off = truth_compare(POINTS, values, lone, NULL);
-            const double most = packing == TRUTH_LONE_RAYS ? 0.0 : 1.0 / FEW;
-            assert_true(off.penumbra > 20);
-            near_value(off.max, 0.0, 1.5 * most, truth_packing_name(packing));
-            near_value(off.rmse, 0.0, 0.1 * most, truth_packing_name(packing));
-        }
     }
 }
 

@@ -1,5 +1,4 @@
-/* Runs of the unwrapper: threads, pages, densities, instances, objects, UVs that are kept, cancelling,
- * limits, bad input. */
+/* Runs of the unwrapper: threads, pages, densities, instances, objects, kept UVs, limits, bad input. */
 #include "testing.h"
 #include "unwraps.h"
 
@@ -50,13 +49,6 @@ static vsh_atlas *assert_same_bits(const vsh_mesh *meshes, size_t count, const v
         }
     }
     return first;
-}
-
-TEST(the_same_bits_for_any_number_of_threads) {
-    FREED shape *one = lump(40), *two = lump(64);
-    const vsh_mesh meshes[2] = {shape_mesh(one, "one"), shape_mesh(two, "two")};
-    const vsh_unwrap_options o = unwrap_into(256);
-    vsh_atlas_free(assert_same_bits(meshes, 2, &o));
 }
 
 enum { BOXES = 12, MESHES = 5, OBJECTS = 4 };

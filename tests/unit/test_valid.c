@@ -78,14 +78,6 @@ TEST(samples_in_solids_are_invalid_and_no_others_at_every_voxel_size) {
     assert_int_equal(invalid[0], invalid[2]);
 }
 
-TEST(lightmaps_are_the_same_for_any_threads) {
-    FREED shape *yard = new_yard();
-    const vsh_mesh mesh = mesh_of(yard);
-    FREED_BY(free_baked) baked one = bake(&mesh, 32, 1, 1.0), five = bake(&mesh, 32, 5, 1.0);
-    assert_memory_equal(one.coverage, five.coverage, SIZE * SIZE * sizeof(float));
-    assert_memory_equal(one.ao, five.ao, SIZE * SIZE * sizeof(float));
-}
-
 TEST(a_room_of_inward_faces_is_valid_but_where_things_stand) {
     FREED shape *s = calloc(1, sizeof *s);
     add_faces(s, (box){{-3.0, 0.0, -3.0}, {3.0, 2.5, 3.0}}, true);

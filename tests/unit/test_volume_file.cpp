@@ -283,22 +283,6 @@ TEST(other_programs_read_names_class_metadata_and_halves) {
     }
 }
 
-TEST(a_failed_write_leaves_the_old_file) {
-    OWNED(vsh_volume) *volume = bake_box(1.5, false);
-    const std::string inner = in_folder("closed"), path = inner + "/out.vdb";
-    assert_int_equal(std::system(("mkdir '" + inner + "'").c_str()), 0);
-    assert_int_equal(vsh_volume_write(volume, inner.c_str(), 0, nullptr, 0, &failure),
-                     VSH_ERROR_WRITE); // a folder
-    std::ofstream(path) << "old";
-    assert_int_equal(std::system(("ln -s /dev/full '" + inner + "/full.vdb'").c_str()), 0);
-    assert_int_equal(vsh_volume_write(volume, (inner + "/full.vdb").c_str(), 0, nullptr, 0, &failure),
-                     VSH_ERROR_WRITE);
-    assert_int_equal(vsh_volume_write(volume, "", 0, nullptr, 0, &failure), VSH_ERROR_ARGUMENT);
-    assert_true(content(path) == "old");
-    assert_int_equal(vsh_volume_write(volume, path.c_str(), 0, nullptr, 0, &failure), VSH_OK);
-    assert_true(content(path) != "old");
-}
-
 int make_folder(void **) {
     const char *place = std::getenv("TMPDIR");
     folder = std::string(place != nullptr ? place : ".") + "/vdbshade-volume-file-XXXXXX";

@@ -1,4 +1,4 @@
-/* Volumes: voxels inside solids, sparseness, threads, limits, cancelling, and what is refused. */
+/* Volumes: voxels inside solids, sparseness, limits, and what is refused. */
 #include "previews.h"
 #include "testing.h"
 #include "volumes.h"
@@ -6,7 +6,6 @@
 #include <sys/stat.h>
 
 static const double UP[3] = {0.0, 1.0, 0.0};
-static const double LOW[3] = {-3.0, -0.4, -3.0}, HIGH[3] = {3.0, 4.0, 3.0};
 
 static char vdb_path[64];
 
@@ -157,59 +156,6 @@ TEST(uniform_regions_are_tiles) {
     assert_true(grid.name[0] == '\0' && grid.active_voxels == 0);
 }
 
-static long size_of_file(unsigned char **bytes) {
-    FILE *file = fopen(vdb_path, "rb");
-    assert_non_null(file);
-    fseek(file, 0, SEEK_END);
-    const long size = ftell(file);
-    rewind(file);
-    *bytes = malloc((size_t)size);
-    assert_int_equal(fread(*bytes, 1, (size_t)size, file), size);
-    fclose(file);
-    return size;
-}
-
-TEST(the_same_file_for_any_number_of_threads_and_instruction_set) {
-    vsh_grid *grid = grid_of(truth_seeds(), 0.08);
-    vsh_voxels *all[2] = {band_of(grid, 0.0), box_of(LOW, HIGH, 0.1)};
-    OWNED(vsh_field) *field = field_of_grid(grid, 4.0);
-    const vsh_light light = sun(truth_seeds_sun, 0.2);
-    static const int32_t methods[] = {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE};
-    for (int v = 0; v < 2; ++v) {
-        for (int m = 0; m < 2; ++m) {
-            vsh_volume_options options = preview_volume_options();
-            options.ao = 1;
-            options.error = 1;
-            options.shade.method = methods[m];
-            options.shade.ao_method = m == 0 ? VSH_AO_CONES : VSH_AO_RAYS;
-            options.shade.ao_distance = 0.3;
-            options.shade.rays = 16;
-            FREED unsigned char *first = NULL;
-            long first_size = 0;
-            for (int n = 0; n < 3; ++n) {
-                vsh_run run = run_on(n == 0 ? 1 : 7);
-                run.isa = n == 2 ? VSH_ISA_BASE : VSH_ISA_BEST;
-                vsh_volume *volume = bake(occluders_of(field), all[v], &light, 1, &options, &run);
-                vsh_volume_info info;
-                vsh_volume_get_info(volume, &info);
-                assert_int_equal(info.grids, m == 0 ? 2 : 4);
-                assert_ok(vsh_volume_write(volume, vdb_path, 0, NULL, 0, &failure));
-                vsh_volume_free(volume);
-                FREED unsigned char *bytes = NULL;
-                const long size = size_of_file(n == 0 ? &first : &bytes);
-                if (n == 0) {
-                    first_size = size;
-                    continue;
-                }
-                assert_int_equal(size, first_size);
-                assert_memory_equal(bytes, first, (size_t)size);
-            }
-        }
-    }
-    vsh_voxels_free(all[1]);
-    vsh_voxels_free(all[0]);
-}
-
 /* --- values read back */
 
 TEST(samples_are_interpolated_between_voxels) {
@@ -250,7 +196,7 @@ TEST(samples_are_interpolated_between_voxels) {
     assert_fails(vsh_volume_copy(volume, 0, last, two, values, &failure), VSH_ERROR_ARGUMENT, "along x");
 }
 
-/* --- limits, cancelling, bad input */
+/* --- limits, bad input */
 
 typedef struct watch {
     double last, stop;
@@ -359,22 +305,20 @@ TEST(bad_boxes_bands_and_options_are_refused) {
               inverted = sun(UP, -1.0);
     nameless[1].name[0] = '\0';
     const struct {
-        const vsh_occluders *occluders;
         const vsh_light *lights;
         size_t count;
         const vsh_volume_options *options;
         const char *part;
-    } bakes[] = {{occluders, NULL, 0, NULL, "nothing to bake"},
-                 {occluders, suns, 2, NULL, "both named 'sun'"},
-                 {occluders, nameless, 2, NULL, "light 1: no name"},
-                 {occluders, &inverted, 1, NULL, "light 0"},
-                 {occluders, suns, 1, &inside, "inside 7"},
-                 {occluders, suns, 1, &rays, "rays 4097"},
-                 {occluders, suns, 1, &taps, "taps"},
-                 {NULL, suns, 1, NULL, "occluders is NULL"}};
+    } bakes[] = {{NULL, 0, NULL, "nothing to bake"},
+                 {suns, 2, NULL, "both named 'sun'"},
+                 {nameless, 2, NULL, "light 1: no name"},
+                 {&inverted, 1, NULL, "light 0"},
+                 {suns, 1, &inside, "inside 7"},
+                 {suns, 1, &rays, "rays 4097"},
+                 {suns, 1, &taps, "taps"}};
     for (size_t i = 0; i < sizeof bakes / sizeof bakes[0]; ++i) {
-        assert_fails(vsh_bake_volume(bakes[i].occluders, voxels, bakes[i].lights, bakes[i].count,
-                                     bakes[i].options, NULL, &volume, NULL, &failure),
+        assert_fails(vsh_bake_volume(occluders, voxels, bakes[i].lights, bakes[i].count, bakes[i].options,
+                                     NULL, &volume, NULL, &failure),
                      VSH_ERROR_ARGUMENT, bakes[i].part);
         assert_null(volume);
     }

@@ -280,38 +280,6 @@ TEST(windows_hold_no_cut_and_no_hole) {
     assert_true(large > TEXELS / 2);
 }
 
-/* Texels of a tile, say, laid out in a whole strip, with others around that do not hang together with them.
- */
-TEST(bits_do_not_depend_on_where_a_table_begins) {
-    enum { WIDTH = 37, HEIGHT = 21 };
-    static const int32_t offsets[][2] = {{0, 0}, {59, 0}, {0, 75}, {59, 75}, {8, 16}, {13, 7}};
-    FREED table *t = make_table(WIDTH, HEIGHT, 16);
-    fill(t, ramp, 9);
-    for (size_t k = 0; k < sizeof offsets / sizeof offsets[0]; ++k) {
-        const int32_t dx = offsets[k][0], dy = offsets[k][1];
-        static uint8_t area[TEXELS];
-        FREED table *large = make_table(EDGE, EDGE, 16);
-        fill(large, even, 10);
-        for (int32_t i = 0; i < TEXELS; ++i) {
-            const int32_t x = i % EDGE - dx, y = i / EDGE - dy;
-            const bool is_in = x >= 0 && x < WIDTH && y >= 0 && y < HEIGHT;
-            area[i] = is_in ? 1 : 2;
-            large->texels[i].value = is_in ? texel_at(t, x, y)->value : large->texels[i].value;
-        }
-        cut(large, area);
-        vshi_windows_sum(&large->windows);
-        for (int32_t i = 0; i < WIDTH * HEIGHT; ++i) {
-            const vshi_window_estimate a = estimate_at(t, i % WIDTH, i / WIDTH);
-            vshi_window_estimate b = estimate_at(large, i % WIDTH + dx, i / WIDTH + dy);
-            for (int32_t end = 0; end < 2; ++end) {
-                b.x[end] -= dx;
-                b.y[end] -= dy;
-            }
-            assert_true(is_same(a, b));
-        }
-    }
-}
-
 /* Eight rays that are all free do not mean that all would be. */
 TEST(no_value_is_without_error) {
     table *alone = make_table(1, 1, 8);

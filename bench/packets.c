@@ -1,4 +1,4 @@
-#include "embree.h"
+#include "packets.h"
 
 const char *truth_packing_name(int packing) {
     static const char *const names[TRUTH_PACKINGS] = {[TRUTH_LONE_RAYS] = "occluded1",

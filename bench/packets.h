@@ -1,0 +1,38 @@
+/* Embree as a yardstick: rays as those of truth_mesh_light() and truth_mesh_ao(), traced in each way that
+ * could be the fastest. The values may differ from truth's by single rays, as packets and lone rays take
+ * other code. */
+#ifndef BENCH_PACKETS_H
+#define BENCH_PACKETS_H
+
+#include "embree.h"
+
+/* rtcOccluded1; packets of 8 and 16 rays of one point; packets of one ray of 8 and 16 points that follow each
+ * other. */
+enum {
+    TRUTH_LONE_RAYS,
+    TRUTH_POINT_8,
+    TRUTH_POINT_16,
+    TRUTH_NEIGHBOURS_8,
+    TRUTH_NEIGHBOURS_16,
+    TRUTH_PACKINGS
+};
+
+/* "occluded1", "occluded8 of a point" …; a static string. */
+const char *truth_packing_name(int packing);
+
+typedef struct truth_question {
+    size_t count;
+    const double *origins; /* [count][3] */
+    const float *normals;  /* [count][3], unit; of a light NULL: no horizon */
+    const double *towards; /* [3], of a light; NULL: AO */
+    double w;              /* of a light: radius at unit distance */
+    double distance;       /* of AO */
+    size_t rays;
+} truth_question;
+
+/* Answers [count], 0 dark … 1; `threads` 0: all cores. Returns 0, or -1 where threads, memory or Embree are
+ * short. */
+int truth_mesh_packets(const truth_mesh *truth, int packing, const truth_question *question, int threads,
+                       float *values);
+
+#endif
