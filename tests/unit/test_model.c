@@ -295,6 +295,19 @@ TEST(files_that_cannot_be_read_say_why) {
     refused("text.fbx", "hello, world", VSH_ERROR_READ, "damaged or cut short", "");
 }
 
+TEST(the_memory_limit_is_checked) {
+    write_bytes("limit.obj", quad_obj, strlen(quad_obj));
+    vsh_run run = vsh_run_default();
+    vsh_model *model;
+    run.memory_limit = 100;
+    assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT,
+                 "limit.obj");
+    run.memory_limit = 1 << 20;
+    assert_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
+    vsh_model_free(model);
+    unlink(path_of("limit.obj").text);
+}
+
 typedef struct watch {
     double last, stop;
     int calls;

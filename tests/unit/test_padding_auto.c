@@ -124,3 +124,12 @@ TEST(a_lightmap_is_filled_to_its_last_corner) {
     }
     assert_true(beyond > TEXELS / 4);
 }
+
+TEST(no_other_padding_is_below_0) {
+    const vsh_mesh mesh = floor_mesh();
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    vsh_charts *charts = NULL;
+    options.padding = -2;
+    assert_fails(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &charts, &failure), VSH_ERROR_ARGUMENT,
+                 "padding -2");
+}

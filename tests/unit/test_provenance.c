@@ -47,6 +47,15 @@ TEST(digests_of_what_is_no_file_are_refused) {
     assert_fails(vsh_file_digest(at("pipe"), NULL, digest, &failure), VSH_ERROR_READ, "");
 }
 
+static const char *value_of(const vsh_attribute *list, size_t count, const char *name) {
+    for (size_t i = 0; i < count; ++i) {
+        if (strcmp(list[i].name, name) == 0) {
+            return list[i].value;
+        }
+    }
+    return NULL;
+}
+
 static void write_text(const char *name, const char *text) {
     write_all(at(name), (const unsigned char *)text, strlen(text));
 }
@@ -171,6 +180,31 @@ TEST(the_error_that_a_channel_was_made_to_is_told) {
         const vsh_attribute one = {"vdbshade_shadow", none[i]};
         assert_true(isnan(vsh_provenance_max_error(&one, 1, "shadow.key")));
     }
+}
+
+TEST(images_carry_them_and_give_them_back) {
+    static const char *const files[] = {"told.exr", "told.png"};
+    static const vsh_attribute told[] = {{"vdbshade_version", "0.2.0"}, {"long", "a line, with = and ;"}};
+    sample s;
+    make(&s, 5, 4, 3, LIGHTMAP);
+    for (size_t f = 0; f < 2; ++f) {
+        vsh_image_options options = vsh_image_options_default();
+        options.attributes = told;
+        options.attribute_count = 2;
+        vsh_image_file *file = NULL;
+        assert_ok(vsh_image_write(at(files[f]), &s.image, &options, &failure));
+        assert_ok(vsh_image_read(at(files[f]), NULL, &file, &failure));
+        size_t count = 0;
+        const vsh_attribute *list = vsh_image_attributes(file, &count);
+        for (size_t i = 0; i < 2; ++i) {
+            const char *value = value_of(list, count, told[i].name);
+            assert_non_null(value);
+            assert_string_equal(value, told[i].value);
+        }
+        assert_null(value_of(list, count, "type"));
+        vsh_image_free(file);
+    }
+    unmake(&s);
 }
 
 TEST(level_sets_and_volumes_carry_them) {

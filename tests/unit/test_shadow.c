@@ -261,6 +261,30 @@ TEST(a_point_near_the_shadow_sees_less_of_larger_lights) {
     }
 }
 
+TEST(a_larger_occluder_hides_more) {
+    const double up[3] = {0.0, 1.0, 0.0};
+    const vsh_light light = sun(up, RADIANS(20.0));
+    float last[VSH_SHADOW_CONE + 1][8];
+    for (int32_t method = 0; method <= VSH_SHADOW_CONE; ++method) {
+        for (int i = 0; i < 8; ++i) {
+            last[method][i] = 1.0f;
+        }
+    }
+    for (double radius = 0.1; radius < 1.2; radius += 0.05) {
+        const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, radius, 0.0};
+        OWNED(vsh_field) *field = field_of((truth_scene){&ball, 1}, 0.03, 0.0);
+        for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
+            for (int i = 0; i < 8; ++i) {
+                const double p[3] = {0.15 * i, -2.0, 0.02 * i};
+                const float v = shadow_at(field, &light, method, p, NULL);
+                assert_true(v <= last[method][i] + 1e-3f);
+                last[method][i] = v;
+            }
+        }
+    }
+    assert_true(last[VSH_SHADOW_CONE][0] == 0.0f);
+}
+
 /* practical is classic through a smoothstep, but for what its march no longer looks at. */
 TEST(practical_is_classic_smoothed) {
     enum { COUNT = 64 * 64 };
