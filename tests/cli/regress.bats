@@ -167,8 +167,7 @@ JSON
 
 @test "a folder without scenes, or without those asked for, is refused" {
     mkdir empty
-    shade regress empty
-    refused 2 'empty: no scenes'
+    refuses 2 'empty: no scenes' -- regress empty
     regress --only nothing
     refused 2 "'nothing'"
 }
@@ -184,8 +183,7 @@ JSON
     [[ $output == "aa: failed"*"aa.json: the bake ended with exit code 2"*"box: unchanged"*"other: not alike"* ]] ||
         fail "not told, or the others were left out"
     [[ $(<out.xml) == *'name="aa'*"failure"* ]] || fail "not in the report"
-    shade regress nowhere
-    refused 3 "nowhere: cannot be read: No such file or directory"
+    refuses 3 "nowhere: cannot be read: No such file or directory" -- regress nowhere
     clean
 }
 

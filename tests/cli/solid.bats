@@ -102,12 +102,10 @@ write_studs() {
 }
 
 @test "a pattern that matches nothing is refused with names" {
-    shade voxelize box.obj -o out.vdb --treat 'bix=solid'
-    refused 2 "no object is named 'bix'"
+    refuses 2 "no object is named 'bix'" -- voxelize box.obj -o out.vdb --treat 'bix=solid'
     [[ $stderr == *"did you mean 'box'"* ]] || fail "no name"
     [ ! -e out.vdb ] || fail "written all the same"
-    shade bake box.obj -o out.exr --ao 1 --treat 'none*=room'
-    refused 2 "no object is named 'none*'"
+    refuses 2 "no object is named 'none*'" -- bake box.obj -o out.exr --ao 1 --treat 'none*=room'
 }
 
 @test "casters of a scene say it too" {
@@ -120,6 +118,5 @@ JSON
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
     [[ $stderr == *"face the other way"* ]] || fail "not inward: $stderr"
     sed -i 's/"solid": "box"/"solid": "bax"/' scene.json
-    shade voxelize scene.json -o out.vdb
-    refused 2 "no object is named 'bax'"
+    refuses 2 "no object is named 'bax'" -- voxelize scene.json -o out.vdb
 }

@@ -158,8 +158,7 @@ count() {
 3 nowhere/trade.html | "${TINY[@]}" -o nowhere/trade.html
 LIST
     while read -r option value; do
-        shade trade box.obj "${TINY[@]}" -o trade.html "$option" "$value"
-        refused 2 "$option" "$value"
+        refuses 2 "$option" "$value" -- trade box.obj "${TINY[@]}" -o trade.html "$option" "$value"
     done <<'LIST'
 --size 0
 --resolutions 1

@@ -64,10 +64,8 @@ fits() {
 @test "no command, an unknown command and an unknown option are usage errors" {
     shade
     refused 2 'no command'
-    shade backe
-    refused 2 "did you mean bake?"
-    shade --verson
-    refused 2 --verson
+    refuses 2 "did you mean bake?" -- backe
+    refuses 2 --verson -- --verson
 }
 
 @test "an unknown option suggests the nearest" {
@@ -81,8 +79,7 @@ LIST
 
 @test "an abbreviated option is refused, as the next version may have another of that beginning" {
     write_box box.obj
-    shade bake box.obj -o out.exr --resol 24 --ao 1
-    refused 2 --resol
+    refuses 2 --resol -- bake box.obj -o out.exr --resol 24 --ao 1
 }
 
 @test "a missing value, a value too many and an operand too many are usage errors" {
@@ -100,8 +97,7 @@ LIST
     write_box box.obj
     old_output out.exr
     while read -r option value; do
-        shade bake box.obj -o out.exr "${SMALL[@]}" "$option" "$value"
-        refused 2 "$option" "$value"
+        refuses 2 "$option" "$value" -- bake box.obj -o out.exr "${SMALL[@]}" "$option" "$value"
     done <<'LIST'
 --ao 0
 --ao -1
@@ -146,8 +142,7 @@ LIST
 --memory-limit 5T
 --memory-limit many
 LIST
-    shade bake box.obj -o out.exr "${SMALL[@]}" --ao ''
-    refused 2 --ao
+    refuses 2 --ao -- bake box.obj -o out.exr "${SMALL[@]}" --ao ''
     untouched out.exr
 }
 
@@ -183,8 +178,7 @@ LIST
 
 @test "voxel size and resolution exclude each other" {
     write_box box.obj
-    shade bake box.obj -o out.exr --ao 1 --resolution 24 --voxel-size 0.1
-    refused 2 --resolution --voxel-size
+    refuses 2 --resolution --voxel-size -- bake box.obj -o out.exr --ao 1 --resolution 24 --voxel-size 0.1
 }
 
 @test "-q and -v are --quiet and --verbose, together with other letters too" {

@@ -36,9 +36,8 @@ load helper
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     old_output out.exr
     # what everything else lies within is a sky dome, unless it is said to be solid
-    shade bake box.obj --caster around.obj --treat box=solid --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
-        -o out.exr
-    refused 2 box.obj "inside solids" info
+    refuses 2 box.obj "inside solids" info -- \
+        bake box.obj --caster around.obj --treat box=solid --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 -o out.exr
     untouched out.exr
 }
 
@@ -46,18 +45,15 @@ load helper
     write_box box.obj
     old_output out.exr
     sed 's/^vt .*/vt 0.5 0.5/' box.obj >flat.obj
-    shade bake flat.obj "${SMALL[@]}" -o out.exr
-    refused 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set"
+    refuses 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set" -- bake flat.obj "${SMALL[@]}" -o out.exr
     awk '$1 == "vt" { print "vt", $2 + 2, $3; next } { print }' box.obj >far.obj
-    shade bake far.obj "${SMALL[@]}" -o out.exr
-    refused 2 far.obj "cover none of 32 × 32 texels" "leave the unit square"
+    refuses 2 far.obj "cover none of 32 × 32 texels" "leave the unit square" -- bake far.obj "${SMALL[@]}" -o out.exr
     untouched out.exr
 }
 
 @test "the picture is a PNG" {
     write_box box.obj
-    shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
-    refused 2 --invalid where.jpg .png
+    refuses 2 --invalid where.jpg .png -- bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
 }
 
 @test "pictures of outputs of one name in several folders have names of their own" {
@@ -72,8 +68,7 @@ load helper
     [ "$(ls where* | wc -l)" -eq 4 ] || fail "$(ls)"
     local name
     for name in wall:32 wall-3:40 wall-2:48 Wall-4:56; do
-        shade info "where.${name%:*}.png"
-        [[ $output == *"${name#*:} × ${name#*:}"* ]] || fail "$name: $output"
+        info_tells "where.${name%:*}.png" "${name#*:} × ${name#*:}"
     done
 }
 

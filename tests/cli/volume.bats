@@ -102,12 +102,10 @@ info() {
 2 'nothing to bake' | box.obj -o out.vdb
 LIST
     for box in 0,0,0,1,1 0,0,0,1,0,1 0,0,0,1,-1,1 0,0,nan,1,1,1 0,0,0,1,1,1,1 a; do
-        shade volume scene.json -o out.vdb --box "$box"
-        refused 2 --box "$box"
+        refuses 2 --box "$box" -- volume scene.json -o out.vdb --box "$box"
     done
     for size in 0 -1 nan 1x; do
-        shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
-        refused 2 --box-voxel-size
+        refuses 2 --box-voxel-size -- volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
     done
     refuse_each volume scene.json -o <<'LIST'
 2 'no --box' | out.vdb --box-voxel-size 1
@@ -132,10 +130,8 @@ LIST
 3 scene.json | scene.json
 LIST
     head -c 300 ls.vdb >cut.vdb
-    shade volume scene.json -o out.vdb --like cut.vdb
-    refused 3 cut.vdb
-    shade volume scene.json -o ls.vdb --like ls.vdb
-    refused 2 ls.vdb --like
+    refuses 3 cut.vdb -- volume scene.json -o out.vdb --like cut.vdb
+    refuses 2 ls.vdb --like -- volume scene.json -o ls.vdb --like ls.vdb
     untouched out.vdb
 }
 

@@ -68,8 +68,7 @@ LIST
             fi
         done
     done
-    shade query no.vdb:hull --points points.csv --distance -o out.csv
-    refused 3 no.vdb
+    refuses 3 no.vdb -- query no.vdb:hull --points points.csv --distance -o out.csv
     mv box.vdb 'a.vdb:hull.vdb'
     succeed query a.vdb:hull.vdb --points points.csv --distance -o out.csv
     succeed query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
