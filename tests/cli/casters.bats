@@ -157,8 +157,7 @@ LIST
 @test "an output over a caster's file is refused" {
     cp "$ASSETS/spheres.csv" own.csv
     scene '{"spheres": "own.csv"}' "$FLOOR"
-    shade bake scene.json -o own.csv
-    [ "$status" -eq 2 ]
+    ends 2 bake scene.json -o own.csv
     cmp own.csv "$ASSETS/spheres.csv"
 }
 

@@ -59,6 +59,5 @@ JSON
 @test "words that a shell would split are quoted" {
     write_box "my box.obj"
     run -0 "$VDBSHADE" bake "my box.obj" -o box.exr --sun 1,2,1 --size 16 --resolution 16 --quiet
-    run -0 "$VDBSHADE" info box.exr
-    [[ $output == *"--resolution 16 'my box.obj'"* ]]
+    info_tells box.exr "--resolution 16 'my box.obj'"
 }

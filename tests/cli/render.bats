@@ -71,8 +71,7 @@ LIST
 @test "outputs that cannot be written are refused before the work" {
     refuses 3 missing -- render box.obj "${SUN[@]}" -o missing/view.png
     refuses 2 view.xyz -- render box.obj "${SUN[@]}" -o view.xyz
-    shade render box.obj "${SUN[@]}" -o box.obj
-    [ "$status" -eq 2 ] || fail "the input would be replaced"
+    ends 2 render box.obj "${SUN[@]}" -o box.obj
     refuse_each render box.obj <<'LIST'
 2 view.png | "${SUN[@]}" -o view.png --stats view.png
 2 'no output' | "${SUN[@]}"

@@ -29,8 +29,7 @@ write_two() {
 
 @test "for an image it gets none unasked, and the error says how" {
     write_bare box.obj
-    shade bake box.obj "${SMALL[@]}" -o x.exr
-    [ "$status" -eq 2 ] || fail "status $status"
+    ends 2 bake box.obj "${SMALL[@]}" -o x.exr
     [[ $stderr == *"--unwrap auto"* ]] || fail "$stderr"
     succeed bake box.obj "${SMALL[@]}" --unwrap auto -o x.exr
 }

@@ -171,8 +171,7 @@ LIST
  "voxel_size": 0.05, "lights": [{"name": "top", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}]}
 JSON
     run -0 "$VDBSHADE" volume scene.json --box -1,0.1,-1,1,0.6,1 -o fog.vdb --quiet
-    run -0 "$VDBSHADE" info fog.vdb
-    [[ $output == *"grid 'shadow.top'"* ]]
+    info_tells fog.vdb "grid 'shadow.top'"
     # the column under the ball is dark: 1 - pi / 64 of the box is lit
     printf '0 0.5 0\n0.5 0.5 0.5\n' >points.csv
     run --separate-stderr -0 "$VDBSHADE" query scene.json --points points.csv -o - --answers-only --quiet
