@@ -122,30 +122,15 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
 
 # A floor of 2 × 2 seen from above, its UVs the left half of the lightmap, and a wall at its right border.
 write_corner() {
-    cat >corner.obj <<'OBJ'
-o floor
-v -1 -1 0
-v 1 -1 0
-v 1 1 0
-v -1 1 0
-vt 0 0
-vt 0.5 0
-vt 0.5 1
-vt 0 1
-f 1/1 2/2 3/3
-f 1/1 3/3 4/4
-o wall
-v 1 -1 0
-v 1 -1 1
-v 1 1 1
-v 1 1 0
-vt 0.6 0
-vt 1 0
-vt 1 1
-vt 0.6 1
-f 5/5 6/6 7/7
-f 5/5 7/7 8/8
-OBJ
+    {
+        printf 'o floor\n'
+        printf 'v %s %s %s\n' -1 -1 0 1 -1 0 1 1 0 -1 1 0
+        printf 'vt %s %s\n' 0 0 0.5 0 0.5 1 0 1
+        printf 'f 1/1 2/2 3/3\nf 1/1 3/3 4/4\no wall\n'
+        printf 'v %s %s %s\n' 1 -1 0 1 -1 1 1 1 1 1 1 0
+        printf 'vt %s %s\n' 0.6 0 1 0 1 1 0.6 1
+        printf 'f 5/5 6/6 7/7\nf 5/5 7/7 8/8\n'
+    } >corner.obj
 }
 
 BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-normals world --quiet)

@@ -31,6 +31,7 @@ write_box() {
     {
         printf 'o box\n'
         printf 'v %s %s %s\n' 0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1
+        # shellcheck disable=SC2086 # pairs of numbers
         for rows in '0.02 0.47' '0.52 0.97'; do
             for columns in '0.02 0.31' '0.35 0.64' '0.68 0.97'; do
                 printf "vt %s ${rows% *}\n" $columns

@@ -3,36 +3,14 @@ load helper
 
 # write_level FILE: a floor of 4 × 4 under a leaf of 1 × 1 and a plate of wood beside it, as materials.bats has them.
 write_level() {
-    cat >"$1" <<'OBJ'
-mtllib level.mtl
-v -2 0 2
-v 2 0 2
-v 2 0 -2
-v -2 0 -2
-v -1 1 0.5
-v 0 1 0.5
-v 0 1 -0.5
-v -1 1 -0.5
-v 0.25 1 0.5
-v 1.25 1 0.5
-v 1.25 1 -0.5
-v 0.25 1 -0.5
-vt 0 0
-vt 1 0
-vt 1 1
-vt 0 1
-o floor
-usemtl earth
-f 1/1 2/2 3/3
-f 1/1 3/3 4/4
-o plate
-usemtl leaf
-f 5/1 6/2 7/3
-f 5/1 7/3 8/4
-usemtl wood
-f 9/1 10/2 11/3
-f 9/1 11/3 12/4
-OBJ
+    {
+        printf 'mtllib level.mtl\n'
+        printf 'v %s %s %s\n' -2 0 2 2 0 2 2 0 -2 -2 0 -2 -1 1 0.5 0 1 0.5 0 1 -0.5 -1 1 -0.5 0.25 1 0.5 1.25 1 0.5 1.25 1 -0.5 0.25 1 -0.5
+        printf 'vt %s %s\n' 0 0 1 0 1 1 0 1
+        printf 'o floor\nusemtl earth\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n'
+        printf 'o plate\nusemtl leaf\nf 5/1 6/2 7/3\nf 5/1 7/3 8/4\n'
+        printf 'usemtl wood\nf 9/1 10/2 11/3\nf 9/1 11/3 12/4\n'
+    } >"$1"
 }
 
 # leaf STATEMENTS: what the leaf is made of.

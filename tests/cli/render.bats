@@ -142,30 +142,15 @@ write_quad() {
 
 # write_post FILE: a post of 0.25 × 3 × 0.5 on a wide floor, whose default voxels are larger than the post.
 write_post() {
-    cat >"$1" <<'OBJ'
-o floor
-v -50 0 -50
-v 50 0 -50
-v 50 0 50
-v -50 0 50
-f 4 3 2
-f 4 2 1
-o post
-v -0.125 0 -0.25
-v 0.125 0 -0.25
-v 0.125 3 -0.25
-v -0.125 3 -0.25
-v -0.125 0 0.25
-v 0.125 0 0.25
-v 0.125 3 0.25
-v -0.125 3 0.25
-f 5 8 7 6
-f 9 10 11 12
-f 5 6 10 9
-f 8 12 11 7
-f 5 9 12 8
-f 6 7 11 10
-OBJ
+    {
+        printf 'o floor\n'
+        printf 'v %s %s %s\n' -50 0 -50 50 0 -50 50 0 50 -50 0 50
+        printf 'f 4 3 2\nf 4 2 1\no post\n'
+        for z in -0.25 0.25; do
+            printf "v %s %s $z\n" -0.125 0 0.125 0 0.125 3 -0.125 3
+        done
+        printf 'f %s %s %s %s\n' 5 8 7 6 9 10 11 12 5 6 10 9 8 12 11 7 5 9 12 8 6 7 11 10
+    } >"$1"
 }
 
 # From above; column c of 200 sees the floor at x = -3.5 + 0.02 (c + 0.5), row 25 of 50 at z = 0.01.

@@ -91,20 +91,13 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
 
 # Two tiles of a floor side by side, two objects, and a box that stands over where they meet and only casts.
 write_tiles() {
-    cat >"$1" <<'EOF'
-o left
-v -2 0 -1
-v 0 0 -1
-v 0 0 1
-v -2 0 1
-f 4 3 2 1
-o right
-v 0 0 -1
-v 2 0 -1
-v 2 0 1
-v 0 0 1
-f 8 7 6 5
-EOF
+    {
+        printf 'o left\n'
+        printf 'v %s 0 %s\n' -2 -1 0 -1 0 1 -2 1
+        printf 'f 4 3 2 1\no right\n'
+        printf 'v %s 0 %s\n' 0 -1 2 -1 2 1 0 1
+        printf 'f 8 7 6 5\n'
+    } >"$1"
     write_box box.obj
     awk '/^v / {print "v", $2 - 0.7, $3 + 0.6, $4 - 0.5}' box.obj >>"$1"
     echo 'o box' >>"$1"
