@@ -1,11 +1,6 @@
 # What a bake writes and says, and says beforehand.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 @test "the same bits for 1, 2 and 5 threads" {
     for threads in 1 2 5; do
         succeed bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 5 --ao 0.6 --irradiance \

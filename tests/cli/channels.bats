@@ -2,7 +2,6 @@
 load helper
 
 @test "bent normals, tints and irradiance have channels of their own" {
-    write_box box.obj
     write_scene box.json box.obj '"tint": "quadratic"' '' '1, 1, 1'
     run -0 "$VDBSHADE" bake box.json --ao 0.5 --size 32 --resolution 32 --bent-normals world \
         --ambient 0.1,0.2,0.3 -o box.exr --quiet
@@ -17,7 +16,6 @@ load helper
 }
 
 @test "eight bits hold half of a bent normal and a half" {
-    write_box box.obj
     run -0 "$VDBSHADE" bake box.obj --ao 0.5 --size 32 --resolution 32 --bent-normals tangent \
         --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o box.png --quiet
     run -0 "$VDBSHADE" info box.png
@@ -27,7 +25,6 @@ load helper
 }
 
 @test "the sky over a box is 1, 1/2 and 0, by option and scene" {
-    write_box box.obj
     options=(--size 64 --resolution 32 --quiet)
     run -0 "$VDBSHADE" bake box.obj --sky z "${options[@]}" --stats stats.json -o whole.exr
     run -0 "$VDBSHADE" info whole.exr
@@ -49,7 +46,6 @@ load helper
 }
 
 @test "what does not go together is told" {
-    write_box box.obj
     refuses 2 "vdbshade: --bent-normals: there is no --ao" -- bake box.obj --sun 1,1,1 --bent-normals world -o box.exr
     refuses 2 "AO by taps knows no directions" -- bake box.obj --ao 1 --ao-method taps --bent-normals world -o box.exr
     refuses 2 "'up'" "world, tangent" -- bake box.obj --ao 1 --bent-normals up -o box.exr

@@ -4,8 +4,10 @@ bats_require_minimum_version 1.5.0
 : "${VDBSHADE:?is to name the vdbshade binary}"
 : "${ASSETS:=$BATS_TEST_DIRNAME/../../assets}"
 
+# Each test starts in an empty folder, but for a cube that can be baked.
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
 }
 
 # write_scene FILE.json MESH [KEYS [KEYS OF THE RECEIVER [DIRECTION]]]: a scene in which a mesh casts and receives, with a sun.

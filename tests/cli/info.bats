@@ -1,11 +1,6 @@
 # info: what a file holds, and what is wrong with it.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 @test "a sound mesh has no problems" {
     succeed info box.obj
     [[ $output == *"triangles: 12"*"UV sets: 1"*"bounds: 0 0 0 to 1 1 1"* && $output != *problem* ]] || fail "not so"

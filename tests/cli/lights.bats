@@ -80,7 +80,6 @@ JSON
 }
 
 @test "a file without lights, one that is not there and sizes without lights are refused" {
-    write_box box.obj
     refuse_each bake box.obj <<'LIST'
 2 "--lights 'box.obj': has no lights" | --lights box.obj -o out.exr
 3 none.glb 'No such file' | --lights none.glb -o out.exr
@@ -160,7 +159,6 @@ write_scene() {
 
 @test "what is wrong with a file of lights is told with its place" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
-    write_box box.obj
     for one in '{"type": "file"}|lights[0]: key "file" is missing' \
         '{"type": "file", "file": "box.obj"}|lights[0].file: box.obj has no lights' \
         '{"type": "file", "file": "none.glb"}|none.glb' \

@@ -3,11 +3,11 @@ load helper
 
 MODELS=$BATS_TEST_DIRNAME/../models
 
-# What is there, in one line, but for Bats' own.
+# What is there, in one line, but for the cube and what Bats writes.
 files() {
     local name names=()
     for name in ${1:-*}; do
-        [[ $name == separate-stderr-* ]] || names+=("$name")
+        [[ $name == separate-stderr-* || $name == box.obj ]] || names+=("$name")
     done
     echo "${names[@]}"
 }
@@ -43,7 +43,6 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
         succeed bake "$MODELS/$model" "${BAKE[@]}" -o lit.glb --preview
         json_of lit.glb | grep -q '"KHR_materials_unlit":{}' || fail "$model: no preview"
     done
-    write_box box.obj
     succeed bake box.obj "${BAKE[@]}" -o lit.glb
     json_of lit.glb | grep -q '"TEXCOORD_0"' || fail "no UVs"
 }

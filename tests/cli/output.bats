@@ -1,11 +1,6 @@
 # Where the output cannot go, and that it comes whole or not at all.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 BAKE=(bake box.obj "${SMALL[@]}" -o)
 
 @test "a folder that does not exist" {
@@ -100,7 +95,6 @@ BAKE=(bake box.obj "${SMALL[@]}" -o)
 }
 
 @test "--output-folder takes all outputs of a scene by their names, and nothing else" {
-    write_box box.obj
     mkdir -p elsewhere maps
     cat >two.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}], "resolution": 16, "ao": {"distance": 1},

@@ -4,11 +4,6 @@ load helper
 SUN=(--sun 0.3,1,0.2 --sun-angle 5)
 QUICK=(--size 40x24 --samples 1 --resolution 24)
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 # png_size FILE: width and height out of its header.
 png_size() {
     [ "$(head -c 8 "$1" | od -An -tx1 | tr -d ' \n')" = 89504e470d0a1a0a ] || fail "$1 is no PNG"

@@ -44,7 +44,6 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
 }
 
 @test "creases have no seams: a box stays as it is" {
-    write_box box.obj
     run -0 "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o plain.exr
     run -0 "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --seams fix -o fixed.exr
     same_values plain.exr fixed.exr
@@ -73,7 +72,6 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
 }
 
 @test "a face that is hidden where boxes touch takes what is nearest beside it" {
-    write_box box.obj
     # another one on top of it
     { cat box.obj; echo 'o upper'; sed -n 's/^v //p' box.obj | awk '{print "v", $1, $2 + 1, $3}'
       sed -n 's/^f //p' box.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) { split($i, p, "/"); out = out " " p[1] + 8 "/" p[2] } print out }'

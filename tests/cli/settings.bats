@@ -41,7 +41,6 @@ tables() {
 }
 
 @test "an option that is refused names itself, its value and what is expected" {
-    write_box box.obj
     refuses 2 "--rays '5000': expected a whole number from 1 to 4096" -- bake box.obj --sun 1,1,1 -o out.exr --rays 5000
     refuses 2 "--size '64x': expected W or WxH, each from 1 to 65536 texels" -- bake box.obj --sun 1,1,1 -o out.exr --size 64x
     refuses 2 "--method 'soft': expected one of hard," -- volume box.obj --sun 1,1,1 -o out.vdb --method soft

@@ -1,11 +1,6 @@
 # Error against time.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 TINY=(--sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12,24 --truth-rays 64 --budget 60)
 
 # column NAME: that column of trade.csv.

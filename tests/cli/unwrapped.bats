@@ -35,7 +35,6 @@ write_two() {
 }
 
 @test "UVs that can be baked are kept, and always replaces them" {
-    write_box box.obj
     "$VDBSHADE" bake box.obj "${SMALL[@]}" -o plain.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap auto -o auto.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap always -o always.exr --quiet
@@ -64,7 +63,6 @@ write_two() {
 }
 
 @test "a mesh that no page can hold lies on several, each triangle on one" {
-    write_box box.obj
     succeed bake box.obj "${SMALL[@]}" --size 32 --unwrap always --texels-per-unit 20 -o x.exr --stats x.json --verbose
     [ -s x.5.exr ] && [ ! -e x.6.exr ] || fail "$(ls)"
     [[ $stderr != *"lie over"* ]] || fail "$stderr"
@@ -76,7 +74,6 @@ write_two() {
 }
 
 @test "UVs that can be baked are packed anew where a density is asked for" {
-    write_box box.obj
     succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 8 -o few.exr
     succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
     # six unit squares
@@ -87,7 +84,6 @@ write_two() {
 @test "info tells density and stretch of UVs, and what auto would do" {
     write_two two.obj
     write_bare bare.obj
-    write_box box.obj
     shade info box.obj --size 100
     [[ $output == *"lightmap UVs: 36.12 texels a unit at 100 × 100, stretch 1.048"* ]] || fail "$output"
     [[ $output == *"--unwrap auto: bakes these UVs as they are"* ]] || fail "$output"

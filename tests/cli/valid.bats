@@ -2,7 +2,6 @@
 load helper
 
 @test "a picture and a channel show the texels that are in another solid, and one line tells of them" {
-    write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     write_scene box.json box.obj '"invalid": true'
     succeed bake box.json --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
@@ -17,7 +16,6 @@ load helper
 }
 
 @test "texels in a solid that lacks a side are 1 in the channel, and no line says that they are seen" {
-    write_box box.obj
     # A bar sticks out of the larger box through its wall. The box lacks the opposite side; a sheet stands before the gap.
     awk '$1 == "v" { print "v", $2, $3, 5 * $4; next } { print }' box.obj >bar.obj
     awk '/^o/ { print "o around"; next } /^f/ && left++ < 2 { next }
@@ -31,7 +29,6 @@ load helper
 }
 
 @test "a bake whose every texel is in a solid is refused, and the old output stays" {
-    write_box box.obj
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     old_output out.exr
     # what everything else lies within is a sky dome, unless it is said to be solid
@@ -41,7 +38,6 @@ load helper
 }
 
 @test "a bake of no texel is refused: UVs without area, or all outside the square" {
-    write_box box.obj
     old_output out.exr
     sed 's/^vt .*/vt 0.5 0.5/' box.obj >flat.obj
     refuses 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set" -- bake flat.obj "${SMALL[@]}" -o out.exr
@@ -51,12 +47,10 @@ load helper
 }
 
 @test "the picture is a PNG" {
-    write_box box.obj
     refuses 2 --invalid where.jpg .png -- bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
 }
 
 @test "pictures of outputs of one name in several folders have names of their own" {
-    write_box box.obj
     mkdir a b c d
     local output outputs=()
     for output in a/wall.exr b/wall.exr c/wall-2.exr d/Wall.exr; do
@@ -72,7 +66,6 @@ load helper
 }
 
 @test "charts closer than a texel are told of, and from which size on they are apart" {
-    write_box box.obj
     succeed bake box.obj "${SMALL[@]}" --size 16 -o out.exr
     [[ $stderr == *"charts lie closer than a texel"*"mesh 'box'"*"from --size 2"[56]" on"* ]] || fail "not told"
     succeed bake box.obj "${SMALL[@]}" --size 26 -o out.exr
@@ -84,7 +77,6 @@ load helper
 }
 
 @test "with nothing said rays decide what is valid, as with exact, and voxels do not" {
-    write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --quiet)
     succeed bake box.obj "${options[@]}" --resolution 8 -o auto.exr
