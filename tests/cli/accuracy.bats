@@ -1,11 +1,6 @@
 # The accurate end: rays, adaptive, exact.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 # by_rays METHOD: a lone box by the method is lit, dark and open, and the file names the method's rays.
 by_rays() {
     write_scene box.json box.obj '"sampler": "blue", "frame": 1'

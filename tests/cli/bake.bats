@@ -1,11 +1,6 @@
 # What a bake writes and says, and says beforehand.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 @test "the same bits for 1, 2 and 5 threads" {
     for threads in 1 2 5; do
         succeed bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 5 --ao 0.6 --irradiance \
@@ -44,8 +39,7 @@ setup() {
 of_preview() {
     succeed bake "$ASSETS/seeds.json" --size 64 --voxel-size 0.1 --method hard --ao-method cones "$2" "$3" --quiet \
         --pack channels -o preview.exr
-    shade info preview.exr
-    [[ $output == *"vdbshade_${1%.sun}: $3"* ]] || fail "$3 is not named"
+    info_tells preview.exr "vdbshade_${1%.sun}: $3"
     [[ $output =~ channel\ \'$1\':\ min\ 0[0-9.]*,\ mean\ (0\.[0-9]+),\ max\ 1 ]] || fail "$3: no light or no dark"
     [[ $means != *" ${BASH_REMATCH[1]} "* ]] || fail "$3 has the values of another"
     means+="${BASH_REMATCH[1]} "
@@ -173,33 +167,26 @@ receiver() {
 
 @test "--floor receives for casters without receivers, also in trade" {
     shade voxelize box.obj -o box.vdb --voxel-size 0.1 --quiet
-    shade bake box.vdb --sun 1,2,1 -o floor.exr
-    refused 2 box.vdb --floor 'vdbshade volume'
+    refuses 2 box.vdb --floor 'vdbshade volume' -- bake box.vdb --sun 1,2,1 -o floor.exr
     succeed bake box.vdb --sun 1,2,1 --sun-angle 5 --floor 6,6,0,-1,0 --size 32 --quiet -o floor.exr
     local scene='"casters": [{"vdb": "box.vdb"}], "voxel_size": 0.1, "lights": [{"name": "sun", "type": "directional", "direction": [1, 2, 1], "angle_deg": 5}]'
     echo "{$scene}" >bare.json
     echo "{$scene, \"receivers\": [{\"plane\": {\"size\": [6, 6], \"center\": [0, -1, 0]}, \"size\": 32, \"output\": \"scene.exr\"}]}" >scene.json
-    shade bake bare.json -o bare.exr
-    refused 2 bare.json --floor
+    refuses 2 bare.json --floor -- bake bare.json -o bare.exr
     succeed bake bare.json --floor 6,6,0,-1,0 --size 32 --quiet -o bare.exr
     succeed bake scene.json --quiet
     same_values bare.exr scene.exr || fail "the option and the key differ"
-    shade bake scene.json --floor 6,6 -o other.exr
-    refused 2 --floor plane
-    shade trade box.vdb --sun 1,2,1 -o trade.html
-    refused 2 box.vdb --floor
+    refuses 2 --floor plane -- bake scene.json --floor 6,6 -o other.exr
+    refuses 2 box.vdb --floor -- trade box.vdb --sun 1,2,1 -o trade.html
     succeed trade box.vdb --sun 1,2,1 --floor 6,6,0,-1,0 --size 16 --resolutions 16 --truth-rays 16 --budget 1 --quiet -o trade.html
     [ -s trade.html ] || fail "no page"
 }
 
 @test "a flat scene is sent to flat, and a scene with receivers to bake" {
     echo '{"region": [-1, -1, 1, 1], "casters": [], "lights": [], "output": "flat.exr"}' >flat.json
-    shade bake flat.json
-    refused 2 flat.json:1 "vdbshade flat"
-    shade query flat.json --points points.csv --distance -o out.csv
-    refused 2 flat.json:1 "vdbshade flat"
-    shade flat "$ASSETS/seeds.json"
-    refused 2 seeds.json "vdbshade bake"
+    refuses 2 flat.json:1 "vdbshade flat" -- bake flat.json
+    refuses 2 flat.json:1 "vdbshade flat" -- query flat.json --points points.csv --distance -o out.csv
+    refuses 2 seeds.json "vdbshade bake" -- flat "$ASSETS/seeds.json"
 }
 
 # --- --dry-run: what a bake will take
@@ -221,8 +208,7 @@ receiver() {
     printf '{"casters": [{"mesh": "box.obj"}], "ao": {"distance": 1}, "receivers": [{"mesh": "box.obj", "size": 32, "output": "lit.glb"}]}' >scene.json
     succeed bake scene.json --output-folder new --dry-run
     [ ! -e new ] || fail "it was made"
-    shade bake box.obj "${SMALL[@]}" -o new/out.exr --dry-run
-    refused 3 "no folder 'new'"
+    refuses 3 "no folder 'new'" -- bake box.obj "${SMALL[@]}" -o new/out.exr --dry-run
 }
 
 @test "its texels are those of the bake" {
@@ -247,8 +233,6 @@ receiver() {
 }
 
 @test "a dry run refuses what a bake refuses" {
-    shade bake box.obj -o out.exr --dry-run
-    refused 2 --sun --ao
-    shade bake missing.obj "${SMALL[@]}" -o out.exr --dry-run
-    refused 3 missing.obj
+    refuses 2 --sun --ao -- bake box.obj -o out.exr --dry-run
+    refuses 3 missing.obj -- bake missing.obj "${SMALL[@]}" -o out.exr --dry-run
 }

@@ -10,7 +10,6 @@ within() {
 }
 
 @test "a reader holds an image's pixels against the limit before it reads them" {
-    write_box box.obj
     "$VDBSHADE" bake box.obj --sun 1,2,1 --size 1024 --resolution 8 --method hard --bits 8 --quiet -o large.png
     # and not the 34 of a copy beside them
     refuses 4 "large.png: about 17 MB are needed, over the memory limit of 10 MB" -- info large.png --memory-limit 10M
@@ -73,7 +72,6 @@ far_cubes() {
 }
 
 @test "a picture counts before it is taken, and with what it shows" {
-    write_box box.obj
     within 300 render box.obj --sun 1,2,1 --size 16384 --memory-limit 100MiB -o out.png
     refused 4 "out.png: about 12885 MB are needed, over the memory limit of 105 MB"
     within 500 render box.obj --sun 1,2,1 --size 64 --resolution 256 --memory-limit 160MiB --quiet -o out.png

@@ -3,7 +3,6 @@
 setup_file() {
     command -v chromium >/dev/null || return 0
     "${CC:-cc}" -std=gnu11 -O1 "$BATS_TEST_DIRNAME/picture.c" -o "$BATS_FILE_TMPDIR/picture" -lpng
-    "${CC:-cc}" -std=gnu11 -O1 "$BATS_TEST_DIRNAME/browser.c" -o "$BATS_FILE_TMPDIR/browser" -ljansson
 }
 
 setup() {
@@ -15,17 +14,17 @@ picture() {
     "$BATS_FILE_TMPDIR/picture" "$@"
 }
 
-# The size of the window for browser.c, an even number.
+# The size of the window for browser.py, an even number.
 WIDE=400
 
-# look PAGE STATE [ACTION …] [-- OPTION …]: opens PAGE#STATE and does what browser.c can do; its picture is in page.png, its
+# look PAGE STATE [ACTION …] [-- OPTION …]: opens PAGE#STATE and does what browser.py can do; its picture is in page.png, its
 # document in page.dom.
 look() {
     local page=$1 state=$2
     shift 2
     local words=("$@")
     [[ " $* " == *" -- "* ]] || words+=(--)
-    timeout 200 "$BATS_FILE_TMPDIR/browser" "file://$PWD/$page#$state" $WIDE page.png page.dom "${words[@]}" \
+    timeout 200 python3 "$BATS_TEST_DIRNAME/browser.py" "file://$PWD/$page#$state" $WIDE page.png page.dom "${words[@]}" \
         --user-data-dir="$BATS_FILE_TMPDIR/profile" 2>page.log || fail "$(tail -5 page.log)"
 }
 

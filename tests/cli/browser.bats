@@ -78,8 +78,7 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
 
 @test "lit: base colour times the lightmap of the third UV set times its intensity times AO" {
     write_squares
-    shade view squares.gltf -o squares.html --quiet
-    done_well
+    succeed view squares.gltf -o squares.html --quiet
     rm squares.gltf squares.bin ao.png "light map.png"
     look squares.html "$FRONT&texels=1"
     state_is ready
@@ -92,8 +91,7 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
 
 @test "AO alone, the lightmap alone, exposure, base colour" {
     write_squares
-    shade view squares.gltf -o squares.html --quiet
-    done_well
+    succeed view squares.gltf -o squares.html --quiet
     look squares.html "$FRONT&texels=1&mode=ao"
     pixel_is 150 100 128 128 128
     pixel_is 250 100 64 64 64
@@ -124,30 +122,15 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
 
 # A floor of 2 × 2 seen from above, its UVs the left half of the lightmap, and a wall at its right border.
 write_corner() {
-    cat >corner.obj <<'OBJ'
-o floor
-v -1 -1 0
-v 1 -1 0
-v 1 1 0
-v -1 1 0
-vt 0 0
-vt 0.5 0
-vt 0.5 1
-vt 0 1
-f 1/1 2/2 3/3
-f 1/1 3/3 4/4
-o wall
-v 1 -1 0
-v 1 -1 1
-v 1 1 1
-v 1 1 0
-vt 0.6 0
-vt 1 0
-vt 1 1
-vt 0.6 1
-f 5/5 6/6 7/7
-f 5/5 7/7 8/8
-OBJ
+    {
+        printf 'o floor\n'
+        printf 'v %s %s %s\n' -1 -1 0 1 -1 0 1 1 0 -1 1 0
+        printf 'vt %s %s\n' 0 0 0.5 0 0.5 1 0 1
+        printf 'f 1/1 2/2 3/3\nf 1/1 3/3 4/4\no wall\n'
+        printf 'v %s %s %s\n' 1 -1 0 1 -1 1 1 1 1 1 1 0
+        printf 'vt %s %s\n' 0.6 0 1 0 1 1 0.6 1
+        printf 'f 5/5 6/6 7/7\nf 5/5 7/7 8/8\n'
+    } >corner.obj
 }
 
 BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-normals world --quiet)
@@ -156,8 +139,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=ao,G=shadow.sun,B=0 --bits 8 -o corner.png
-    shade view corner.obj --planes corner.exr -o corner.html --quiet
-    done_well
+    succeed view corner.obj --planes corner.exr -o corner.html --quiet
     # 32 × 64 texels over 400 × 400 pixels: the middle of texel (i, j) is at ((i + 1/2) 12.5, (j + 1/2) 6.25)
     look corner.html "$FRONT&texels=1&mode=ao"
     state_is ready
@@ -183,8 +165,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     local kind x shown=()
     for kind in plain packed; do
         "$VDBSHADE" bake $kind.gltf --sun 0.2,1,1 --size 64 --unwrap never --quiet -o $kind.exr
-        shade view $kind.gltf --planes $kind.exr -o $kind.html --quiet
-        done_well
+        succeed view $kind.gltf --planes $kind.exr -o $kind.html --quiet
         look $kind.html "fov=90&camera=0,3,1,0,0,0&ui=0&mode=light&channel=shadow.sun"
         state_is ready
         shown+=("$(for x in 70 110 150 190 230 330; do picture get page.png $x 155; done)")
@@ -195,8 +176,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
 
 @test "a scene: light, shadow and AO at the vertices of its surface, which can be picked" {
     sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >seeds.json
-    shade view seeds.json -o seeds.html --quiet
-    done_well
+    succeed view seeds.json -o seeds.html --quiet
     # 4 × 4 of the floor from above: x and z from -2 to 2, a pixel is 0.01 at y = 0. What is higher is nearer the border.
     local above="fov=90&camera=0,2,0.0001,0,0,0&ui=0"
     look seeds.html "$above&mode=light&channel=shadow.sun"
@@ -217,8 +197,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o bent.png
-    shade view corner.obj --planes corner.exr -o corner.html --quiet
-    done_well
+    succeed view corner.obj --planes corner.exr -o corner.html --quiet
     look corner.html "$FRONT&texels=1&mode=bent"
     for texel in 4,10 28,20 30,60; do
         local i=${texel%,*} j=${texel#*,}
@@ -261,8 +240,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     for name in near far; do
         "$VDBSHADE" bake corner.obj "${BAKE[@]}" $([ $name = far ] && echo --ao 0.1) --pack R=ao,G=ao,B=ao --bits 8 -o $name.png
     done
-    shade view corner.obj --planes near.exr --other-planes far.exr -o two.html --quiet
-    done_well
+    succeed view corner.obj --planes near.exr --other-planes far.exr -o two.html --quiet
     look two.html "$FRONT&texels=1&mode=ao&split=0.9"
     state_is ready
     pixel_is 356 203 $(picture get near.png 28 32)
@@ -275,8 +253,7 @@ BAKE=(--sun 1,0.2,1 --sun-angle 20 --ao 1 --size 64 --max-error 0.05 --bent-norm
     grep -q '<th>bake</th><td>far.exr</td>' page.dom || fail "the second bake is not told"
     # two models
     write_squares
-    shade view squares.gltf corner.obj -o models.html --quiet
-    done_well
+    succeed view squares.gltf corner.obj -o models.html --quiet
     look models.html "$FRONT&mode=base&split=0.5"
     pixel_is 100 100 $(lit 255 255 255 0.8 0.4 0.2 1)
     pixel_is 300 100 $(lit 255 255 255 0.8 0.8 0.8 1)
@@ -289,8 +266,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
 @test "on a phone targets are 44 pixels large, the panel takes a third, and Hide can be taken back" {
     write_squares
     write_corner
-    shade view squares.gltf corner.obj -o models.html --quiet
-    done_well
+    succeed view squares.gltf corner.obj -o models.html --quiet
     WIDE=390x844m look models.html "mode=light" \
         "tell:[...document.querySelectorAll('button, select, input[type=range], label:has([type=checkbox])')].map(e => [e.id, e.getBoundingClientRect()])
             .filter(([id, r]) => r.width > 0 && (r.width < 44 || r.height < 44)).map(([id, r]) => id + ' ' + r.width + ' ' + r.height).join()" \
@@ -306,8 +282,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
 @test "labels are whole where there is room" {
     write_corner
     cp corner.obj "a corner with a rather long name.obj"
-    shade view corner.obj "a corner with a rather long name.obj" -o models.html --quiet
-    done_well
+    succeed view corner.obj "a corner with a rather long name.obj" -o models.html --quiet
     WIDE=1440x900 look models.html "" \
         "tell:[...document.querySelectorAll('span, label, button, h1')].filter(e => e.scrollWidth > e.clientWidth && e.clientWidth > 0).map(e => e.textContent).join()" \
         "tell:String(document.getElementById('right').clientWidth > 100)" >told
@@ -316,8 +291,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
 
 @test "texel density, checker and charts of a mesh without a bake" {
     write_corner
-    shade view corner.obj -o corner.html --quiet
-    done_well
+    succeed view corner.obj -o corner.html --quiet
     # floor: 512 × 1024 texels over 2 × 2; wall: 410 × 1024 over 1 × 2; no lightmap: 1024² is taken
     look corner.html "ui=1&$FRONT&mode=density"
     grep -o '[0-9]*</span><span>texels a unit' page.dom >/dev/null || fail "no legend"
@@ -334,8 +308,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
 @test "every mesh format shows its triangles" {
     models=$BATS_TEST_DIRNAME/../models
     for file in scene.obj scene.ply scene.stl scene.fbx scene.dae scene.gltf scene.glb scene_draco.glb figure.glb; do
-        shade view "$models/$file" -o page.html --quiet
-        done_well
+        succeed view "$models/$file" -o page.html --quiet
         look page.html "ui=0&mode=base&theme=dark"
         state_is ready
         # something else than the back is in the middle third
@@ -348,8 +321,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     NAME_A='</script><script>document.title=\"gone\"</script><img src=x onerror=\"document.title=1\">' LIGHT=http://127.0.0.1:9/light.png write_squares
     evil='<img src=x onerror=document.title=1>&quot;.gltf'
     mv squares.gltf "$evil"
-    shade view "$evil" -o squares.html --quiet
-    done_well
+    succeed view "$evil" -o squares.html --quiet
     ! grep -q '<img' squares.html || fail "a tag came through"
     look squares.html "ui=1&$FRONT&pick=0.25,0.3" -- --log-net-log="$PWD/net.json"
     state_is ready
@@ -369,15 +341,13 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     state_is failed
     grep -q 'shows no WebGL 2' page.dom || fail "$(grep -o 'id="message".*' page.dom)"
     sed 's/"POSITION": 0,/"POSITION": 0, "JOINTS_0": 99,/' squares.gltf >joints.gltf
-    shade view joints.gltf -o joints.html --quiet
-    done_well
+    succeed view joints.gltf -o joints.html --quiet
     look joints.html "$FRONT&texels=1"
     state_is ready
     grep -q 'square a is not shown: accessor 99 is not there' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
     pixel_is 350 100 $(lit 160 170 180 1 1 1 "$(over_pi '200 / 255')")
     sed -i 's/"source": 0/"source": 7/' squares.gltf
-    shade view squares.gltf -o squares.html --quiet
-    done_well
+    succeed view squares.gltf -o squares.html --quiet
     look squares.html ""
     grep -q 'squares.gltf: image 7 is not shown' page.dom || fail "$(grep -o 'id="problems".*' page.dom)"
 }
@@ -388,8 +358,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     sed 's/"textures": \[{"source": 0}, {"source": 1}\]/"textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}]/
          s/"extensionsUsed": \[/"extensionsUsed": ["EXT_texture_webp", "KHR_texture_basisu", /' squares.gltf >webp.gltf
     grep -q EXT_texture_webp.*source webp.gltf
-    shade view webp.gltf -o webp.html --quiet
-    done_well
+    succeed view webp.gltf -o webp.html --quiet
     look webp.html ""
     state_is ready
     grep -q 'texture 1 is not shown: browsers do not read the images of KHR_texture_basisu' page.dom ||

@@ -18,8 +18,7 @@ scene() { # casters, receivers, more keys
 # refuse_scene CASTERS RECEIVERS CODE WORD …: a bake of that scene ends with the code, and says the words.
 refuse_scene() {
     scene "$1" "$2"
-    shade bake scene.json
-    refused "${@:3}"
+    refuses "${@:3}" -- bake scene.json
 }
 
 # A hill of 16 bits, 257 × 257.
@@ -112,8 +111,7 @@ write_hill() {
 2 '--height' 'seeds_floor.obj is no image of heights' | seeds_floor.obj --height 2 --ao 1 -o out.exr
 LIST
     printf '{%s, "receivers": []}' "$SUN" >scene.json
-    shade bake scene.json
-    refused 2 'key "casters" is missing'
+    refuses 2 'key "casters" is missing' -- bake scene.json
     refuse_scene "{$LAND, \"extent\": [10, 10]}" "$OVER" 2 'casters[0].extent: cannot stand beside "size"'
 }
 
@@ -153,20 +151,17 @@ LIST
 
 @test "a memory limit holds for terrains and spheres" {
     scene "{$LAND, \"direct\": true}" "$FLOOR"
-    shade bake scene.json --memory-limit 200000
-    refused 4 terrain.png
+    refuses 4 terrain.png -- bake scene.json --memory-limit 200000
 }
 
 @test "an output over a caster's file is refused" {
     cp "$ASSETS/spheres.csv" own.csv
     scene '{"spheres": "own.csv"}' "$FLOOR"
-    shade bake scene.json -o own.csv
-    [ "$status" -eq 2 ]
+    ends 2 bake scene.json -o own.csv
     cmp own.csv "$ASSETS/spheres.csv"
 }
 
 @test "trade refuses casters without voxels" {
     scene '{"spheres": "spheres.csv"}' "$FLOOR"
-    shade trade scene.json -o report.html
-    refused 2 "not part of it"
+    refuses 2 "not part of it" -- trade scene.json -o report.html
 }

@@ -91,7 +91,6 @@ needs_slurm() {
 
 @test "a bake on Slurm comes to what one bake does, though a node's daemon is killed in the middle" {
     needs_slurm
-    write_box box.obj
     bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256)
     "$VDBSHADE" "${bake[@]}" -o one.exr --quiet
     daemons=()
@@ -122,7 +121,6 @@ PROGRAM
 }
 
 @test "submit asks for what the estimate says, and refuses what it cannot share out" {
-    write_box box.obj
     mkdir bin
     printf '#!/bin/sh\nprintf "%%s\\n" "$*" >>asked\necho 7\n' >bin/sbatch
     chmod +x bin/sbatch

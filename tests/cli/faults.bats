@@ -19,8 +19,7 @@ QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points poin
     touch .out.99999997.tmp.exr # of a process that another machine knows
     exec 9>.out.99999997.tmp.exr
     flock -n 9
-    shade bake box.obj "${SMALL[@]}" --quiet --stats stats.json -o out.exr 9>&-
-    done_well
+    succeed bake box.obj "${SMALL[@]}" --quiet --stats stats.json -o out.exr 9>&-
     exec 9>&-
     for file in "${mine[@]}"; do
         [ ! -e "$file" ] || fail "$file is still there"

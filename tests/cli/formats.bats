@@ -3,11 +3,6 @@ load helper
 
 : "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 # endings_after TEXT: the endings in the first column of the table whose head holds the text.
 endings_after() {
     awk -F'|' -v text="$1" 'index($0, text) { inside = 1 }
@@ -47,7 +42,6 @@ endings_after() {
 }
 
 @test "light in a PNG is sRGB, and light over 1 is told once with its share" {
-    write_box box.obj
     bake=(bake box.obj --sun 0,3,4 --irradiance --size 32 --resolution 24 --bits 8)
     succeed "${bake[@]}" -o light.png --quiet
     "$VDBSHADE" info light.png | grep -qx 'vdbshade_color_space: sRGB' || fail "it does not say sRGB"

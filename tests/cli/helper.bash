@@ -4,8 +4,10 @@ bats_require_minimum_version 1.5.0
 : "${VDBSHADE:?is to name the vdbshade binary}"
 : "${ASSETS:=$BATS_TEST_DIRNAME/../../assets}"
 
+# Each test starts in an empty folder, but for a cube that can be baked.
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
+    write_box box.obj
 }
 
 # write_scene FILE.json MESH [KEYS [KEYS OF THE RECEIVER [DIRECTION]]]: a scene in which a mesh casts and receives, with a sun.
@@ -28,53 +30,19 @@ no_sun() {
 
 # A unit cube, closed, each face with its own sixth of the UV square.
 write_box() {
-    cat >"$1" <<'OBJ'
-o box
-v 0 0 0
-v 1 0 0
-v 1 1 0
-v 0 1 0
-v 0 0 1
-v 1 0 1
-v 1 1 1
-v 0 1 1
-vt 0.02 0.02
-vt 0.31 0.02
-vt 0.31 0.47
-vt 0.02 0.47
-vt 0.35 0.02
-vt 0.64 0.02
-vt 0.64 0.47
-vt 0.35 0.47
-vt 0.68 0.02
-vt 0.97 0.02
-vt 0.97 0.47
-vt 0.68 0.47
-vt 0.02 0.52
-vt 0.31 0.52
-vt 0.31 0.97
-vt 0.02 0.97
-vt 0.35 0.52
-vt 0.64 0.52
-vt 0.64 0.97
-vt 0.35 0.97
-vt 0.68 0.52
-vt 0.97 0.52
-vt 0.97 0.97
-vt 0.68 0.97
-f 1/1 4/2 3/3
-f 1/1 3/3 2/4
-f 5/5 6/6 7/7
-f 5/5 7/7 8/8
-f 1/9 2/10 6/11
-f 1/9 6/11 5/12
-f 4/13 8/14 7/15
-f 4/13 7/15 3/16
-f 1/17 5/18 8/19
-f 1/17 8/19 4/20
-f 2/21 3/22 7/23
-f 2/21 7/23 6/24
-OBJ
+    {
+        printf 'o box\n'
+        printf 'v %s %s %s\n' 0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1
+        # shellcheck disable=SC2086 # pairs of numbers
+        for rows in '0.02 0.47' '0.52 0.97'; do
+            for columns in '0.02 0.31' '0.35 0.64' '0.68 0.97'; do
+                printf "vt %s ${rows% *}\n" $columns
+                printf "vt %s ${rows#* }\n" ${columns#* } ${columns% *}
+            done
+        done
+        printf 'f %s %s %s\n' 1/1 4/2 3/3 1/1 3/3 2/4 5/5 6/6 7/7 5/5 7/7 8/8 1/9 2/10 6/11 1/9 6/11 5/12 \
+            4/13 8/14 7/15 4/13 7/15 3/16 1/17 5/18 8/19 1/17 8/19 4/20 2/21 3/22 7/23 2/21 7/23 6/24
+    } >"$1"
 }
 
 # A small bake of box.obj, which is there: quick, and right in every respect.
@@ -144,10 +112,14 @@ done_well() {
     [ "$status" -eq 0 ] || fail "expected success"
 }
 
-# succeed WORD …: runs the program, which must end with 0.
+# ends CODE ARG …: runs the program, which must end with CODE.
+ends() {
+    shade "${@:2}"
+    [ "$status" -eq "$1" ] || fail "expected exit code $1"
+}
+
 succeed() {
-    shade "$@"
-    done_well
+    ends 0 "$@"
 }
 
 # info_tells FILE TEXT …: what info prints of the file has every text.

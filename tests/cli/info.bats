@@ -1,49 +1,37 @@
 # info: what a file holds, and what is wrong with it.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 @test "a sound mesh has no problems" {
-    shade info box.obj
-    done_well
+    succeed info box.obj
     [[ $output == *"triangles: 12"*"UV sets: 1"*"bounds: 0 0 0 to 1 1 1"* && $output != *problem* ]] || fail "not so"
 }
 
 @test "an open mesh, degenerate triangles and overlapping UVs are problems" {
     { sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' box.obj && echo 'f 1/1 1/1 2/2'; } >bad.obj
-    shade info bad.obj
-    done_well
+    succeed info bad.obj
     [[ $output == *"problem: 3 open edges"*"problem: 1 triangles of zero area"*"lie over other charts"* ]] || fail "not so"
 }
 
 @test "the sample asset is sound" {
-    shade info "$ASSETS/cloister.glb"
-    done_well
+    succeed info "$ASSETS/cloister.glb"
     [[ $output != *"other charts"* && $output != *"leave the UV square"* ]] || fail "UVs"
 }
 
 @test "a level set" {
-    shade voxelize box.obj -o box.vdb --voxel-size 0.05 --name hull --quiet
-    done_well
-    shade info box.vdb
-    done_well
+    succeed voxelize box.obj -o box.vdb --voxel-size 0.05 --name hull --quiet
+    succeed info box.vdb
     [[ $output == *"grid 'hull'"*"class: level set"*"voxel size: 0.05 0.05 0.05"* ]] || fail "not what was written"
     [[ $output != *problem* ]] || fail "a problem"
 }
 
 @test "a scene" {
-    shade info "$ASSETS/seeds.json"
-    done_well
+    succeed info "$ASSETS/seeds.json"
     [[ $output == *"caster 0: sdf"*"light 'sun'"*"receiver 0: "* ]] || fail "no summary"
 }
 
 @test "missing, damaged and empty files" {
     for ending in obj vdb exr json; do
-        shade info "none.$ending"
-        refused 3 "none.$ending"
+        refuses 3 "none.$ending" -- info "none.$ending"
     done
     for ending in obj glb ply stl exr png vdb; do
         : >"empty.$ending"
@@ -54,8 +42,7 @@ setup() {
 }
 
 @test "a damaged level set, byte by byte, never takes the program down" {
-    shade voxelize box.obj -o box.vdb --resolution 16 --quiet
-    done_well
+    succeed voxelize box.obj -o box.vdb --resolution 16 --quiet
     local size at part # not i: Bats' own tracing counts with it
     size=$(wc -c <box.vdb)
     for ((part = 1; part <= 40; ++part)); do
@@ -70,8 +57,7 @@ setup() {
 }
 
 @test "control characters of a file name stay out of the terminal" {
-    shade info $'none\033[31m\n.obj'
-    refused 3 'none?[31m?.obj'
+    refuses 3 'none?[31m?.obj' -- info $'none\033[31m\n.obj'
 }
 
 @test "control characters of names within files stay out of the terminal" {
@@ -79,8 +65,7 @@ setup() {
     write_box "$name.obj"
     printf '{"casters": [{"mesh": "b\\u001b[31mox\\u009b.obj"}], "voxel_size": 0.2,
         "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}]}' >scene.json
-    shade info scene.json
-    done_well
+    succeed info scene.json
     [[ "$output" == *'b?[31mox??.obj'* ]] || fail "$output"
     mkdir -p cases
     printf '{"cases": [{"scene": "none.json", "command": "volume", "output": "a\\u001b[31m.vdb", "name": "c\\u001b[31m"}]}' >cases/regress.json

@@ -7,95 +7,54 @@ setup() {
     old_output out.exr
 }
 
-bake_bad() {
-    shade bake "$1" -o out.exr "${SMALL[@]}" "${@:2}"
+# refuse_input CODE INPUT WORD …: a bake of the INPUT ends with CODE, says its name and the WORDs, and leaves the old output.
+refuse_input() {
+    refuses "$1" "${@:2}" -- bake "$2" -o out.exr "${SMALL[@]}"
+    untouched out.exr
 }
 
-@test "a missing file" {
-    bake_bad none.obj
-    refused 3 none.obj
-    bake_bad none.json
-    refused 3 none.json
-    bake_bad box.obj --caster none.obj
-    refused 3 none.obj
+@test "a mesh or scene that is not there, a folder and an empty file are refused with code 3" {
+    refuse_input 3 none.obj
+    refuse_input 3 none.json
+    refuses 3 none.obj -- bake box.obj -o out.exr "${SMALL[@]}" --caster none.obj
     refuses 3 none.glb 'cannot be opened' -- bake none.glb
     refuses 3 none.glb 'cannot be opened' -- bake none.glb -o out.exr
     refuses 3 none.glb 'cannot be opened' -- render none.glb -o out.png
     refuses 3 none.glb 'cannot be opened' -- volume none.glb -o out.vdb
-    untouched out.exr
-}
-
-@test "a folder in place of a file" {
     mkdir folder.obj
-    bake_bad folder.obj
-    refused 3 folder.obj
-    untouched out.exr
-}
-
-@test "an empty mesh" {
+    refuse_input 3 folder.obj
     : >empty.obj
-    bake_bad empty.obj
-    refused 3 empty.obj
+    refuse_input 3 empty.obj
+}
+
+@test "a mesh without triangles, without area, without UVs or without that UV set is refused" {
     printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\n' >points.obj
-    bake_bad points.obj
-    refused 2 points.obj
-    untouched out.exr
-}
-
-@test "a mesh without UVs" {
+    refuse_input 2 points.obj
+    printf 'v 0 0 0\nv 1 0 0\nvt 0 0\nvt 1 0\nf 1/1 2/2 1/1\n' >line.obj
+    refuse_input 2 line.obj
     sed -e '/^vt/d' -e 's,/[0-9]*,,g' box.obj >bare.obj
-    bake_bad bare.obj
-    refused 2 bare.obj 'no UVs'
+    refuse_input 2 bare.obj 'no UVs'
+    refuses 2 box.obj 'UV set 3' -- bake box.obj -o out.exr "${SMALL[@]}" --uv-set 3
     untouched out.exr
 }
 
-@test "a UV set that does not exist" {
-    bake_bad box.obj --uv-set 3
-    refused 2 box.obj 'UV set 3'
-    untouched out.exr
-}
-
-@test "vertices that are not finite" {
-    for value in nan inf -inf 1e999; do
-        sed "s/^v 1 1 1/v 1 $value 1/" box.obj >bad.obj
-        bake_bad bad.obj
-        refused 2 bad.obj
+@test "vertices and UVs that are not finite and indices out of range are refused" {
+    local change
+    for change in 's/^v 1 1 1/v 1 nan 1/' 's/^v 1 1 1/v 1 inf 1/' 's/^v 1 1 1/v 1 -inf 1/' 's/^v 1 1 1/v 1 1e999 1/' \
+        's/^vt 0.31 0.02/vt nan 0.02/' 's,^f 1/1 4/2 3/3,f 1/1 4/2 3/99,'; do
+        sed "$change" box.obj >bad.obj
+        refuse_input 2 bad.obj
     done
-    untouched out.exr
-}
-
-@test "UVs that are not finite" {
-    sed 's/^vt 0.31 0.02/vt nan 0.02/' box.obj >bad.obj
-    bake_bad bad.obj
-    refused 2
-    untouched out.exr
-}
-
-@test "an index out of range" {
     sed 's,^f 1/1 4/2 3/3,f 1/1 99/2 3/3,' box.obj >bad.obj
-    bake_bad bad.obj
-    refused 2 bad.obj 99
-    sed 's,^f 1/1 4/2 3/3,f 1/1 4/2 3/99,' box.obj >bad.obj
-    bake_bad bad.obj
-    refused 2 bad.obj
-    untouched out.exr
+    refuse_input 2 bad.obj 99
 }
 
 @test "zero-area triangles are skipped and counted" {
     { cat box.obj && printf 'f 1/1 1/1 2/2\nf 3/3 3/3 3/3\n'; } >sliver.obj
-    bake_bad sliver.obj --verbose
-    done_well
+    succeed bake sliver.obj -o out.exr "${SMALL[@]}" --verbose
     [[ $stderr == *"2 triangles of zero area"* ]] || fail "they are not counted"
-    shade bake box.obj -o whole.exr "${SMALL[@]}"
-    done_well
+    succeed bake box.obj -o whole.exr "${SMALL[@]}"
     same_values out.exr whole.exr
-}
-
-@test "nothing but zero-area triangles" {
-    printf 'v 0 0 0\nv 1 0 0\nvt 0 0\nvt 1 0\nf 1/1 2/2 1/1\n' >line.obj
-    bake_bad line.obj
-    refused 2
-    untouched out.exr
 }
 
 @test "a voxel size so small that the memory limit would be passed" {
@@ -125,29 +84,21 @@ bake_bad() {
 }
 
 @test "a damaged level set" {
-    shade voxelize box.obj -o box.vdb --resolution 24 --quiet
-    done_well
+    succeed voxelize box.obj -o box.vdb --resolution 24 --quiet
     cat >vdb.json <<'JSON'
 {"casters": [{"vdb": "cut.vdb"}], "ao": {"distance": 1},
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "out.exr"}]}
 JSON
     head -c 700 box.vdb >cut.vdb
-    shade bake vdb.json
-    [ "$status" -eq 2 ] || [ "$status" -eq 3 ] || fail "expected bad input or a file that cannot be read"
-    refused "$status" cut.vdb
+    refuses 3 cut.vdb -- bake vdb.json
     printf 'no level set at all' >cut.vdb
-    shade bake vdb.json
-    [ "$status" -eq 2 ] || [ "$status" -eq 3 ] || fail "expected bad input or a file that cannot be read"
-    refused "$status" cut.vdb
+    refuses 3 cut.vdb -- bake vdb.json
     untouched out.exr
 }
 
 @test "a cut binary model" {
     head -c 3000 "$ASSETS/cloister.glb" >cut.glb
-    bake_bad cut.glb
-    [ "$status" -eq 2 ] || [ "$status" -eq 3 ] || fail "expected bad input or a file that cannot be read"
-    refused "$status" cut.glb
-    untouched out.exr
+    refuse_input 3 cut.glb
 }
 
 @test "a scene whose flags do not fit it" {

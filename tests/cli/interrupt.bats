@@ -46,7 +46,6 @@ interrupt() {
 }
 
 @test "SIGHUP is ignored under nohup" {
-    write_box box.obj
     (
         trap '' HUP
         exec "$VDBSHADE" bake box.obj --sun 0,1,0 --sun-angle 5 --size 1024 --resolution 256 --progress --sandbox off -o long.exr 2>long.txt

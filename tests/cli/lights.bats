@@ -76,23 +76,19 @@ JSON
     shade info out.exr
     [[ $output == *"shadow.lamp"* && $output == *"shadow.sky"* && $output == *"other.gltf"* ]] || fail "$output"
     sed -i 's/"name": "sky"/"name": "lamp"/' scene.json
-    shade bake scene.json --lights other.gltf
-    refused 2 "--lights 'other.gltf'" "'lamp'" "of the scene's file"
+    refuses 2 "--lights 'other.gltf'" "'lamp'" "of the scene's file" -- bake scene.json --lights other.gltf
 }
 
 @test "a file without lights, one that is not there and sizes without lights are refused" {
-    write_box box.obj
     refuse_each bake box.obj <<'LIST'
 2 "--lights 'box.obj': has no lights" | --lights box.obj -o out.exr
 3 none.glb 'No such file' | --lights none.glb -o out.exr
 2 '--light-radius: there is no --lights' | --sun 0,1,0 --light-radius 1 -o out.exr
 LIST
     write_lit lit.gltf "$(down 0 lamp 0,3,0)" '{"type": "point", "intensity": -1}'
-    shade bake box.obj --lights lit.gltf -o out.exr
-    refused 2 lit.gltf 'lights[0]' 'intensity' '-1'
+    refuses 2 lit.gltf 'lights[0]' 'intensity' '-1' -- bake box.obj --lights lit.gltf -o out.exr
     write_lit lit.gltf "$(down 0 lamp 0,3,0)" "$LAMP"
-    shade bake box.obj --lights lit.gltf -o lit.gltf
-    refused 2 'the output is the file of --lights'
+    refuses 2 'the output is the file of --lights' -- bake box.obj --lights lit.gltf -o lit.gltf
 }
 
 # write_scene FILE LIGHTS [MORE]: a scene of lit.gltf with its floor as receiver.
@@ -133,8 +129,7 @@ write_scene() {
     layered ', "lights": ["lamp"]' '' 1,0,1
     layered '' ', "layers": []' 1,1,0
     write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"layers": [{"name": "a", "lights": ["moon"]}],'
-    shade bake scene.json
-    refused 2 'layers[0].lights[0]: "moon" is none of the scene'
+    refuses 2 'layers[0].lights[0]: "moon" is none of the scene' -- bake scene.json
 }
 
 @test "render, query, volume and trade take the lights of a file" {
@@ -164,7 +159,6 @@ write_scene() {
 
 @test "what is wrong with a file of lights is told with its place" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
-    write_box box.obj
     for one in '{"type": "file"}|lights[0]: key "file" is missing' \
         '{"type": "file", "file": "box.obj"}|lights[0].file: box.obj has no lights' \
         '{"type": "file", "file": "none.glb"}|none.glb' \
@@ -178,10 +172,8 @@ write_scene() {
         [[ $status -ge 2 && $stderr == *"${one#*|}"* ]] || fail "${one%|*}: $stderr"
     done
     write_scene scene.json '{"type": "file", "file": "lit.gltf"}'
-    shade bake scene.json --lights file
-    refused 2 "--lights 'file': scene.json is a scene"
+    refuses 2 "--lights 'file': scene.json is a scene" -- bake scene.json --lights file
     cp lit.gltf lights.gltf
     write_scene scene.json '{"type": "file", "file": "lights.gltf"}'
-    shade bake scene.json -o lights.gltf
-    refused 2 'lights.gltf: the output is also a file of lights'
+    refuses 2 'lights.gltf: the output is also a file of lights' -- bake scene.json -o lights.gltf
 }

@@ -36,22 +36,19 @@ kept() {
     refused 3 "theirs/box.exr: cannot be written: a link leads from the folder of 'theirs/scene.json' to " elsewhere/mine.exr
     kept
     ln -sf ../elsewhere/new.exr theirs/box.exr # to nothing that is there
-    shade bake theirs/scene.json
-    refused 3 "theirs/box.exr: cannot be written: a link leads"
+    refuses 3 "theirs/box.exr: cannot be written: a link leads" -- bake theirs/scene.json
     kept
     ln -s "$PWD/elsewhere" theirs/sub
     local one
     for one in sub/mine.exr ./sub/../sub/new.exr; do
         scene "$one"
-        shade bake theirs/scene.json
-        refused 3 "a link leads"
+        refuses 3 "a link leads" -- bake theirs/scene.json
         kept
         (cd theirs && run --separate-stderr "$VDBSHADE" bake scene.json && refused 3 "a link leads") || fail "from inside"
         kept
     done
     scene sub/made/x.exr
-    shade bake theirs/scene.json --per-object
-    refused 3 "a link leads"
+    refuses 3 "a link leads" -- bake theirs/scene.json --per-object
     kept
 }
 
@@ -68,8 +65,7 @@ kept() {
     succeed bake theirs/scene.json --quiet
     [ -s elsewhere/said.exr ] || fail "not written"
     scene absent/x.exr
-    shade bake theirs/scene.json
-    refused 3 "there is no folder 'theirs/absent'"
+    refuses 3 "there is no folder 'theirs/absent'" -- bake theirs/scene.json
 }
 
 @test "a scene of 2D does not write through a link" {
@@ -79,16 +75,14 @@ kept() {
  "casters": [{"shape": "box", "half_size": [0.3, 0.1]}],
  "lights": [{"name": "moon", "type": "directional", "direction": [1, 1], "angle_deg": 5}]}
 JSON
-    shade flat theirs/flat.json
-    refused 3 "theirs/flat.exr: cannot be written: a link leads"
+    refuses 3 "theirs/flat.exr: cannot be written: a link leads" -- flat theirs/flat.json
     kept
 }
 
 @test "a folder of scenes does not have its cache or golden bakes written elsewhere" {
     old_output elsewhere/mine.exr
     ln -s ../elsewhere/mine.exr theirs/.regress-cache.json
-    shade regress theirs
-    refused 3 "theirs/.regress-cache.json: cannot be written: a link leads"
+    refuses 3 "theirs/.regress-cache.json: cannot be written: a link leads" -- regress theirs
     kept
     rm theirs/.regress-cache.json
     ln -s ../elsewhere theirs/golden

@@ -13,8 +13,7 @@ commands() {
 @test "help prints what --help of a command prints, and pages of the manual" {
     for command in $(commands); do
         "$VDBSHADE" "$command" --help >expected.txt
-        shade help "$command"
-        done_well
+        succeed help "$command"
         [[ $output == "$(cat expected.txt)"* ]] || fail "$command"
     done
     docs=$BATS_TEST_DIRNAME/../../docs
@@ -23,8 +22,7 @@ commands() {
         name=$(basename "$topic" .md)
         cmp page.txt "$(find "$docs" -iname "$name.md")"
     done
-    shade help
-    done_well
+    succeed help
     for page in "$docs"/*.md; do
         name=$(basename "$page" .md)
         [ "$name" = architecture ] || [[ $output == *"$name "* ]] || fail "$name is missing"
@@ -33,16 +31,11 @@ commands() {
 }
 
 @test "an unknown topic suggests the nearest, and what does not go together is refused" {
-    shade help seen
-    refused 2 seen 'did you mean scene?'
-    shade help bakke
-    refused 2 'did you mean bake?'
-    shade help zzzzzzzzz
-    refused 2 "vdbshade help"
-    shade help bake --write pages
-    refused 2 TOPIC
-    shade help --man scene
-    refused 2 scene
+    refuses 2 seen 'did you mean scene?' -- help seen
+    refuses 2 'did you mean bake?' -- help bakke
+    refuses 2 "vdbshade help" -- help zzzzzzzzz
+    refuses 2 TOPIC -- help bake --write pages
+    refuses 2 scene -- help --man scene
 }
 
 @test "there is a man page for the program and each command, with every option of its help" {

@@ -81,24 +81,19 @@ JSON
  "voxel_size": 0.04, "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0.2], "angle_deg": 5}],
  "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 64, "output": "one.exr"}]}
 JSON
-    shade bake scene.json --threads 1 --quiet
-    done_well
+    succeed bake scene.json --threads 1 --quiet
     sed -i 's/one.exr/two.exr/' scene.json
-    shade bake scene.json --threads 7 --quiet
-    done_well
+    succeed bake scene.json --threads 7 --quiet
     same_values one.exr two.exr
-    shade info scene.json
-    done_well
+    succeed info scene.json
     [[ $output == *"caster 0: text $FONT"*"caster 1: mask emblem.png"* ]] || fail "not described"
-    shade info one.exr
-    done_well
+    succeed info one.exr
     [[ $output == *"channel 'shadow.sun': min 0, "*"max 1"* ]] || fail "no shadow, or nothing else"
 }
 
 refuses_caster() { # STATUS CASTER WORD …
     printf '{"casters": [%s], "voxel_size": 0.05}' "$2" >bad.json
-    shade voxelize bad.json -o out.vdb
-    refused "$1" "${@:3}"
+    refuses "$1" "${@:3}" -- voxelize bad.json -o out.vdb
 }
 
 @test "masks that are no masks" {
@@ -109,8 +104,7 @@ refuses_caster() { # STATUS CASTER WORD …
     head -c 300 emblem.png >cut.png
     refuses_caster 3 '{"mask": "cut.png", "size": 1, "thickness": 1}' cut.png
     printf '{"casters": [{"mask": "emblem.png", "size": 1, "thickness": 1}]}' >large.json
-    shade voxelize large.json -o out.vdb --voxel-size 0.0001 --memory-limit 64MiB
-    refused 4
+    refuses 4 -- voxelize large.json -o out.vdb --voxel-size 0.0001 --memory-limit 64MiB
     mkdir folder.png
     refuses_caster 3 '{"mask": "folder.png", "size": 1, "thickness": 1}' folder.png
     untouched out.vdb
@@ -134,8 +128,7 @@ refuses_caster() { # STATUS CASTER WORD …
  "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}],
  "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 16, "output": "o.exr"}]}
 JSON
-    shade bake scene.json
-    done_well
+    succeed bake scene.json
     [[ $stderr == *"shadow exact"* ]] || fail "$stderr"
 }
 

@@ -70,8 +70,7 @@ BAKE=(--sun 0,1,0 --sun-angle 2 --ao 1 --size 96)
 
 # bake FILE OUT [options]: the light on the floor.
 bake() {
-    shade bake "$1" "${BAKE[@]}" --receive floor -o "$2" "${@:3}"
-    done_well
+    succeed bake "$1" "${BAKE[@]}" --receive floor -o "$2" "${@:3}"
 }
 
 # mean_of FILE: of the sun's shadow.
@@ -104,14 +103,12 @@ differ() {
     bake masked.gltf none.exr --max-error 0.005
     bake masked.gltf fine.exr --max-error 0.005 --method exact --ao-method exact --resolution 96
     # each keeps 0.005; single values and edges are those of other rays
-    shade compare fine.exr none.exr --max-rmse 0.004 --max-difference 0.1 --max-p99 1 --max-penumbra 9 --max-shift 9
-    [ "$status" -eq 0 ] || fail "$output$stderr"
+    succeed compare fine.exr none.exr --max-rmse 0.004 --max-difference 0.1 --max-p99 1 --max-penumbra 9 --max-shift 9
 }
 
 @test "a texture that is not there leaves the material whole, with a warning" {
     rm emblem.png
-    shade bake masked.gltf "${BAKE[@]}" --receive floor -o out.exr
-    [ "$status" -eq 0 ]
+    succeed bake masked.gltf "${BAKE[@]}" --receive floor -o out.exr
     [[ $stderr == *"material 'leaf' casts whole, without the holes of its texture"* ]] || fail "$stderr"
     cp "$ASSETS/emblem.png" .
     bake whole.gltf whole.exr
@@ -122,8 +119,7 @@ differ() {
     mkdir -p in
     cp masked.gltf in/
     sed -i 's,"emblem.png","../emblem.png",' in/masked.gltf
-    shade bake in/masked.gltf "${BAKE[@]}" --receive floor -o out.exr
-    [ "$status" -eq 0 ]
+    succeed bake in/masked.gltf "${BAKE[@]}" --receive floor -o out.exr
     [[ $stderr == *"outside of its folder"* ]] || fail "$stderr"
     bake in/masked.gltf allowed.exr --allow-outside
     bake masked.gltf beside.exr
@@ -134,8 +130,7 @@ differ() {
 @test "blended materials cast where they are cut out, by --cast-blended too, and glass only by that" {
     write_level hashed.gltf "$(leaf BLEND)" emblem.png
     bake masked.gltf masked.exr
-    shade bake hashed.gltf "${BAKE[@]}" --receive floor --verbose -o hashed.exr
-    [ "$status" -eq 0 ]
+    succeed bake hashed.gltf "${BAKE[@]}" --receive floor --verbose -o hashed.exr
     [[ $stderr == *"blended materials that their textures cut out"* ]] || fail "$stderr"
     same_values masked.exr hashed.exr || fail "hashed leaves"
     bake hashed.gltf asked.exr --cast-blended
@@ -159,22 +154,17 @@ differ() {
     differ whole.exr leafless.exr
     differ leafless.exr woodless.exr
     same_values bare.exr plateless.exr || fail "both materials are not the object"
-    shade bake whole.gltf "${BAKE[@]}" --no-receive leaf --no-receive wood -o others.exr
-    done_well
+    succeed bake whole.gltf "${BAKE[@]}" --no-receive leaf --no-receive wood -o others.exr
     same_values others.exr whole.exr || fail "--no-receive"
-    shade bake whole.gltf "${BAKE[@]}" --receive earth -o named.exr
-    done_well
+    succeed bake whole.gltf "${BAKE[@]}" --receive earth -o named.exr
     same_values named.exr whole.exr || fail "--receive"
     local -a fit=(--sun 0,1,0 --size 96 --unwrap always)
     shade bake whole.gltf "${fit[@]}" --density floor=0.5 -o whole.exr
-    shade bake whole.gltf "${fit[@]}" --density earth=0.5 -o named.exr
-    done_well
+    succeed bake whole.gltf "${fit[@]}" --density earth=0.5 -o named.exr
     same_values named.exr whole.exr || fail "--density"
-    shade bake whole.gltf "${BAKE[@]}" --receive floor --treat leaf=sheet --treat 'material:w*=solid' -o named.exr
-    done_well
+    succeed bake whole.gltf "${BAKE[@]}" --receive floor --treat leaf=sheet --treat 'material:w*=solid' -o named.exr
     old_output out.exr
-    shade bake whole.gltf "${BAKE[@]}" --no-cast woof -o out.exr
-    refused 2 "no object is named 'woof'" "did you mean 'wood'" "materials 'leaf', 'earth'"
+    refuses 2 "no object is named 'woof'" "did you mean 'wood'" "materials 'leaf', 'earth'" -- bake whole.gltf "${BAKE[@]}" --no-cast woof -o out.exr
 }
 
 @test "light on the backs of one-sided materials comes through" {
@@ -188,34 +178,28 @@ JSON
     }
     bake whole.gltf whole.exr
     one_sided whole.gltf
-    shade bake scene.json -o above.exr
-    done_well
+    succeed bake scene.json -o above.exr
     same_values whole.exr above.exr || fail "their fronts do not cast"
     sed 's/"translation": \[-0.5, 0, 0\]/"translation": [-0.5, 2, 0], "rotation": [1, 0, 0, 0]/' whole.gltf >turned.gltf
     bake turned.gltf both.exr
     bake turned.gltf none.exr --no-cast plate
     differ both.exr none.exr
     one_sided turned.gltf
-    shade bake scene.json
-    done_well
+    succeed bake scene.json
     same_values scene.exr none.exr || fail "their backs cast"
-    shade bake scene.json --method cone --ao-method cones -o cone.exr
-    [ "$status" -eq 0 ]
+    succeed bake scene.json --method cone --ao-method cones -o cone.exr
     [[ $stderr == *"2 of 3 meshes are one-sided, but voxels cast to both sides"* ]] || fail "$stderr"
 }
 
 @test "in a lit asset a material that does not receive stays as it was" {
-    shade bake masked.gltf --sun 0,1,0 --unwrap always --no-receive leaf --size 64 -o lit.gltf
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake masked.gltf --sun 0,1,0 --unwrap always --no-receive leaf --size 64 -o lit.gltf
     grep -o '"name": *"leaf"[^]]*' lit.gltf | head -1 | grep -q MOZ_lightmap && fail "the leaf has a lightmap"
     grep -q MOZ_lightmap lit.gltf || fail "nothing has a lightmap"
-    shade info lit.gltf
-    done_well
+    succeed info lit.gltf
 }
 
 @test "info says how a material casts" {
-    shade info masked.gltf
-    [[ $output == *"masked (leaves, fences): it casts by its texture's alpha"* ]] || fail "$output"
+    info_tells masked.gltf "masked (leaves, fences): it casts by its texture's alpha"
 }
 
 # The names of an image's inputs.
@@ -248,16 +232,12 @@ inputs_of() {
     sha256sum emblem.png level.bin >sums
     local out
     for out in emblem.png link.png; do
-        shade bake level.gltf "${BAKE[@]}" --receive floor -o "$out"
-        refused 2 "$out: the output is also an input" emblem.png
-        shade render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
-        refused 2 "$out: the output is also an input" emblem.png
-        shade bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
-        refused 2 "$out: the output is also an input" emblem.png
+        refuses 2 "$out: the output is also an input" emblem.png -- bake level.gltf "${BAKE[@]}" --receive floor -o "$out"
+        refuses 2 "$out: the output is also an input" emblem.png -- render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
+        refuses 2 "$out: the output is also an input" emblem.png -- bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
     done
     for out in level.bin hard.json; do
-        shade bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
-        refused 2 "$out: the output is also an input" level.bin
+        refuses 2 "$out: the output is also an input" level.bin -- bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
     done
     sha256sum --check --quiet sums || fail "an input was replaced"
     bake level.gltf out.exr
@@ -280,8 +260,7 @@ JSON
     bake masked.gltf part.exr --shard 1/2
     change_texture
     bake masked.gltf part.exr --shard 2/2
-    shade merge part.exr
-    refused 2 part.exr.1-of-2.part 'is of other inputs or options' emblem.png
+    refuses 2 part.exr.1-of-2.part 'is of other inputs or options' emblem.png -- merge part.exr
     shade regress scenes
     [[ $output == *"leaf: not alike"* ]] || fail "not baked again"
 }

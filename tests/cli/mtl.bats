@@ -3,36 +3,14 @@ load helper
 
 # write_level FILE: a floor of 4 × 4 under a leaf of 1 × 1 and a plate of wood beside it, as materials.bats has them.
 write_level() {
-    cat >"$1" <<'OBJ'
-mtllib level.mtl
-v -2 0 2
-v 2 0 2
-v 2 0 -2
-v -2 0 -2
-v -1 1 0.5
-v 0 1 0.5
-v 0 1 -0.5
-v -1 1 -0.5
-v 0.25 1 0.5
-v 1.25 1 0.5
-v 1.25 1 -0.5
-v 0.25 1 -0.5
-vt 0 0
-vt 1 0
-vt 1 1
-vt 0 1
-o floor
-usemtl earth
-f 1/1 2/2 3/3
-f 1/1 3/3 4/4
-o plate
-usemtl leaf
-f 5/1 6/2 7/3
-f 5/1 7/3 8/4
-usemtl wood
-f 9/1 10/2 11/3
-f 9/1 11/3 12/4
-OBJ
+    {
+        printf 'mtllib level.mtl\n'
+        printf 'v %s %s %s\n' -2 0 2 2 0 2 2 0 -2 -2 0 -2 -1 1 0.5 0 1 0.5 0 1 -0.5 -1 1 -0.5 0.25 1 0.5 1.25 1 0.5 1.25 1 -0.5 0.25 1 -0.5
+        printf 'vt %s %s\n' 0 0 1 0 1 1 0 1
+        printf 'o floor\nusemtl earth\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n'
+        printf 'o plate\nusemtl leaf\nf 5/1 6/2 7/3\nf 5/1 7/3 8/4\n'
+        printf 'usemtl wood\nf 9/1 10/2 11/3\nf 9/1 11/3 12/4\n'
+    } >"$1"
 }
 
 # leaf STATEMENTS: what the leaf is made of.
@@ -55,8 +33,7 @@ setup() {
 # bake STATEMENTS OUT [options]
 bake() {
     leaf "$1"
-    shade bake level.obj --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o "$2" "${@:3}"
-    [ "$status" -eq 0 ] || fail "$1"
+    succeed bake level.obj --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o "$2" "${@:3}"
 }
 
 same() {
@@ -80,8 +57,7 @@ lit() {
     lit whole.exr 87.5
     bake 'map_d right.pgm' blended.exr --cast-blended
     same blended.exr right.exr
-    shade info level.obj
-    [[ $output == *"it casts no shadow, unless its texture cuts it out"* ]] || fail "$output"
+    info_tells level.obj "it casts no shadow, unless its texture cuts it out"
 }
 
 @test "an image with alpha cuts out as a glTF's mask does" {
@@ -109,8 +85,7 @@ GLTF
         printf '\0\0\0\0\0\0\x80\x3f\0\0\0\xbf\0\0\x80\xbf\0\0\x80\x3f\0\0\0\xbf'
     } >level.bin
     bake 'map_d emblem.png' obj.exr --no-cast wood --ao 1
-    shade bake mask.gltf --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o gltf.exr --ao 1
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake mask.gltf --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o gltf.exr --ao 1
     same obj.exr gltf.exr
     bake 'map_d -imfchan m emblem.png' matte.exr --no-cast wood --ao 1
     same matte.exr gltf.exr
@@ -189,6 +164,5 @@ GLTF
     [ "$names" = "left half.pgm level.mtl level.obj " ] || fail "$names"
     shade bake level.obj --sun 0,1,0 --size 16 --receive floor --no-cast material:leaf -o 'left half.pgm'
     refused 2 'left half.pgm: the output is also an input'
-    shade bake level.obj --sun 0,1,0 --size 16 --receive floor -o out.exr --stats level.mtl
-    refused 2 'level.mtl: the output is also an input'
+    refuses 2 'level.mtl: the output is also an input' -- bake level.obj --sun 0,1,0 --size 16 --receive floor -o out.exr --stats level.mtl
 }

@@ -17,29 +17,23 @@ write_scene() {
 by_each() {
     local input=$1 code=$2
     shift 2
-    shade bake "$input" --quiet -o out.exr
-    refused "$code" "$input: " "$@"
-    shade query "$input" --points points.csv --quiet -o out.csv
-    refused "$code" "$input: " "$@"
-    shade volume "$input" --quiet -o out.vdb
-    refused "$code" "$input: " "$@"
-    shade render "$input" --size 8x8 --quiet -o out.png
-    refused "$code" "$input: " "$@"
+    refuses "$code" "$input: " "$@" -- bake "$input" --quiet -o out.exr
+    refuses "$code" "$input: " "$@" -- query "$input" --points points.csv --quiet -o out.csv
+    refuses "$code" "$input: " "$@" -- volume "$input" --quiet -o out.vdb
+    refuses "$code" "$input: " "$@" -- render "$input" --size 8x8 --quiet -o out.png
 }
 
 @test "a voxel size out of range names the scene, and the layer" {
     local ball='{"sdf": {"shape": "sphere", "radius": 1}}'
     write_scene below.json "$ball" ', "voxel_size": 1e-13'
-    shade bake below.json --quiet -o out.exr
-    refused 2 "below.json:2:" "voxel_size: 1e-13 is out of range 1e-12 … 1e+12"
+    refuses 2 "below.json:2:" "voxel_size: 1e-13 is out of range 1e-12 … 1e+12" -- bake below.json --quiet -o out.exr
     write_scene small.json "$ball" ', "voxel_size": 1e-12'
     by_each small.json 4 "voxel size 1e-12: " "5.36871e+08 at most"
     write_scene large.json '{"sdf": {"shape": "sphere", "radius": 1e14}}' ', "resolution": 8'
     by_each large.json 4 "voxel size 2.5e+13: " "1e-12 … 1e+12"
     write_scene far.json '{"sdf": {"shape": "sphere", "radius": 1, "translate": [1e14, 0, 0]}}' ', "resolution": 8'
     by_each far.json 4 "4e+14 voxels from the origin, 1e12 at most"
-    shade voxelize far.json --quiet -o out.vdb
-    refused 4 "far.json: voxel size "
+    refuses 4 "far.json: voxel size " -- voxelize far.json --quiet -o out.vdb
     write_scene layer.json "$ball, {\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}, \"layer\": \"clouds\"}" \
         ', "resolution": 8, "layers": [{"name": "clouds", "voxel_size": 1e-12}]'
     by_each layer.json 4 "layer 'clouds': voxel size 1e-12: "
@@ -49,12 +43,9 @@ by_each() {
     local size
     for size in 1e-30 1e30; do
         printf "v 0 0 0\nv $size 0 0\nv 0 $size 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n" >huge.obj
-        shade bake huge.obj --sun 0,1,0 --size 8 --quiet -o out.exr
-        refused 4 "huge.obj: " "; scale the scene"
-        shade bake huge.obj --sun 0,1,0 --size 8 --method cone --quiet -o out.exr
-        refused 4 "huge.obj: voxel size "
-        shade voxelize huge.obj --quiet -o out.vdb
-        refused 4 "huge.obj: voxel size "
+        refuses 4 "huge.obj: " "; scale the scene" -- bake huge.obj --sun 0,1,0 --size 8 --quiet -o out.exr
+        refuses 4 "huge.obj: voxel size " -- bake huge.obj --sun 0,1,0 --size 8 --method cone --quiet -o out.exr
+        refuses 4 "huge.obj: voxel size " -- voxelize huge.obj --quiet -o out.vdb
     done
     shade query box.obj --caster huge.obj --sun 0,1,0 --points points.csv --quiet -o out.csv # of 1e30
     refused 4 "box.obj: " "; scale the scene"
@@ -70,8 +61,7 @@ by_each() {
       printf '\0\0\200\77\0\0\0\0\0\0\0\0\0\0\300\177\0\0\0\0'
       printf '\0\0\0\0\0\0\200\77\0\0\0\0\0\0\0\0\0\0\200\77'
       printf '\3\0\0\0\0\1\0\0\0\2\0\0\0'; } >nan.ply
-    shade bake nan.ply --sun 0,1,0 --size 8 --quiet -o out.exr
-    refused 2 "nan.ply: mesh 0: vertex 1: UV (nan, 0) is not finite"
+    refuses 2 "nan.ply: mesh 0: vertex 1: UV (nan, 0) is not finite" -- bake nan.ply --sun 0,1,0 --size 8 --quiet -o out.exr
 }
 
 @test "what has no outline or no surface names the scene or the image" {
@@ -86,8 +76,7 @@ by_each() {
 @test "a file that a flat scene's caster names and that is not there is told with the scene" {
     printf '{"region": [-1, -1, 1, 1], "casters": [{"mask": "none.png", "size": 1}],
         "lights": [{"name": "a", "type": "disc", "position": [0, 0]}]}' >plane.json
-    shade flat plane.json --quiet -o out.exr
-    refused 3 "plane.json: casters[0]: none.png: "
+    refuses 3 "plane.json: casters[0]: none.png: " -- flat plane.json --quiet -o out.exr
 }
 
 @test "a lightmap without the light's channel is named" {
@@ -99,8 +88,7 @@ by_each() {
 @test "an output that a scene names is told with the scene" {
     printf '{"casters": [{"mesh": "box.obj"}], "receivers": [{"mesh": "box.obj", "output": "bake.xyz"}],
         "lights": [{"name": "a", "type": "directional", "direction": [0, 1, 0]}]}' >scene.json
-    shade bake scene.json --size 8 --quiet
-    refused 2 "scene.json: receivers[0]: output bake.xyz: ending 'xyz'"
+    refuses 2 "scene.json: receivers[0]: output bake.xyz: ending 'xyz'" -- bake scene.json --size 8 --quiet
 }
 
 @test "a file that a scene names and that cannot be read is told with the scene, and why, however long its name is" {

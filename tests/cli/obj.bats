@@ -10,19 +10,16 @@ setup() {
 LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
 
 @test "the light is an image that materials name, and fits the UVs" {
-    shade bake bare.obj "${LIGHT[@]}" -o lit.obj
-    done_well
+    succeed bake bare.obj "${LIGHT[@]}" -o lit.obj
     no_leftovers
     [ "$(ls lit.*)" = $'lit.mtl\nlit.obj\nlit.preview.png' ] || fail "$(ls)"
     [ "$(grep mtllib lit.obj)" = 'mtllib lit.mtl' ] || fail "$(head -3 lit.obj)"
     [ "$(grep usemtl lit.obj)" = 'usemtl page_0' ] || fail 'not one material'
     [ "$(grep -E '^(newmtl|map_)' lit.mtl)" = $'newmtl page_0\nmap_Ka lit.preview.png\nmap_Kd lit.preview.png' ] || fail "$(cat lit.mtl)"
     # baked by the UVs that it has now
-    shade bake lit.obj "${LIGHT[@]}" --irradiance --ambient 0.25,0.25,0.25 --seams fix --bits 8 \
+    succeed bake lit.obj "${LIGHT[@]}" --irradiance --ambient 0.25,0.25,0.25 --seams fix --bits 8 \
         --pack R=irradiance.R,G=irradiance.G,B=irradiance.B -o again.png
-    done_well
-    shade compare lit.preview.png again.png --max-difference 0 --max-coverage 0 --quiet
-    [ "$status" -eq 0 ] || fail "another image: $stderr"
+    succeed compare lit.preview.png again.png --max-difference 0 --max-coverage 0 --quiet
     [ "$(grep -c '^f' lit.obj)" = 12 ] || fail 'triangles are lost'
 }
 
@@ -35,8 +32,7 @@ LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
     } >two.obj
     printf 'newmtl red\nnewmtl blue\n' >two.mtl
     for command in 'bake --sun 0.3,1,0.2 --unwrap always' unwrap; do
-        shade ${command%% *} two.obj $(cut -s -d' ' -f2- <<<"$command") --size 64 -o out.obj
-        done_well
+        succeed ${command%% *} two.obj $(cut -s -d' ' -f2- <<<"$command") --size 64 -o out.obj
         shade info two.obj
         before=$(grep "^mesh" <<<"$output")
         [ "$(grep '^o ' out.obj)" = $'o first_box\no second' ] || fail "$(grep '^[og] ' out.obj)"
@@ -50,8 +46,7 @@ LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
     sed 's/^o box/o other/; s/^v \([0-9]\)/v 3\1/; /^f/d' box.obj >other
     { grep -v '^vt' box.obj | sed 's#/[0-9]*##g'; grep '^[ov] ' other; grep '^f' bare.obj |
         awk '{ printf "f"; for (i = 2; i <= 4; ++i) printf " %d", $i + 8; print "" }'; } >two.obj
-    shade bake two.obj "${LIGHT[@]}" --size 32 --texels-per-unit 20 --no-receive other -o lit.obj
-    done_well
+    succeed bake two.obj "${LIGHT[@]}" --size 32 --texels-per-unit 20 --no-receive other -o lit.obj
     pages=$(grep -c '^newmtl page' lit.mtl)
     [ "$pages" -gt 1 ] || fail "$(cat lit.mtl)"
     for ((i = 0; i < pages; ++i)); do
@@ -64,23 +59,16 @@ LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
 
 @test "what an OBJ cannot have, and files of others, are refused" {
     printf 'newmtl red\n' >lit.mtl
-    shade bake bare.obj "${LIGHT[@]}" -o lit.obj
-    refused 2 'lit.mtl: would be replaced, which vdbshade has not written'
+    refuses 2 'lit.mtl: would be replaced, which vdbshade has not written' -- bake bare.obj "${LIGHT[@]}" -o lit.obj
     [ "$(cat lit.mtl)" = 'newmtl red' ] && [ ! -e lit.obj ] && [ ! -e lit.preview.png ] || fail "$(ls)"
     rm lit.mtl
-    shade bake bare.obj "${LIGHT[@]}" -o lit.obj --view lit.html
-    refused 2 "--view 'lit.html': shows what a .glb"
-    shade bake bare.obj "${LIGHT[@]}" -o lit.obj
-    done_well
-    shade bake bare.obj "${LIGHT[@]}" -o lit.obj # over its own
-    done_well
+    refuses 2 "--view 'lit.html': shows what a .glb" -- bake bare.obj "${LIGHT[@]}" -o lit.obj --view lit.html
+    succeed bake bare.obj "${LIGHT[@]}" -o lit.obj
+    succeed bake bare.obj "${LIGHT[@]}" -o lit.obj # over its own
 }
 
 @test "unwrap writes glTF, too: the input with another lightmap set" {
-    shade unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
-    done_well
-    shade info out.glb
-    [[ $output == *"UV sets: 2"* ]] || fail "$output"
-    shade unwrap "$ASSETS/cloister.glb" -o out.ply
-    refused 2 'give -o OUT.obj, .glb or .gltf'
+    succeed unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
+    info_tells out.glb "UV sets: 2"
+    refuses 2 'give -o OUT.obj, .glb or .gltf' -- unwrap "$ASSETS/cloister.glb" -o out.ply
 }

@@ -56,8 +56,7 @@ LEVEL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
     same_values floor.exr pattern.exr || fail "the pattern chose something else"
     succeed bake level.obj "${LEVEL[@]}" --no-receive 'wall_?' -o others.exr --quiet
     same_values floor.exr others.exr || fail "--no-receive left something else"
-    shade bake level.obj "${LEVEL[@]}" --receive 'wall*' -o walls.exr
-    refused 2 '1 of 2 meshes' "'wall_2'" "'wall_1'"
+    refuses 2 '1 of 2 meshes' "'wall_2'" "'wall_1'" -- bake level.obj "${LEVEL[@]}" --receive 'wall*' -o walls.exr
     # from the side, the next object's shadow; none where nothing else casts
     local side=(--sun 1,0.3,0 --sun-angle 2 --size 32 --voxel-size 0.05 --receive floor --quiet)
     succeed bake level.obj "${side[@]}" -o shadowed.exr
@@ -84,8 +83,7 @@ LIST
     [ -s base.floor.png ] && [ -s base.wall.png ] || fail "$(ls)"
     succeed bake level.obj "${LEVEL[@]}" --per-object -o 'x/%s_light.png' --quiet
     [ -s x/roof_light.png ] || fail "$(ls x)"
-    shade bake level.obj "${LEVEL[@]}" -o maps/
-    refused 2 maps/ --per-object
+    refuses 2 maps/ --per-object -- bake level.obj "${LEVEL[@]}" -o maps/
 }
 
 @test "names are made safe for file systems and unique" {
@@ -105,8 +103,7 @@ LIST
     [ "$(ls maps)" = floor.exr ] || fail "$(ls maps)"
     [ "$(grep -c 'no UVs' <<<"$stderr")" -eq 1 ] || fail "not one line"
     [[ $stderr == *"2 times"*"'bare'"*"casts only"* ]] || fail "not both"
-    shade bake bare.obj "${LEVEL[@]}" -o out.exr
-    refused 2 bare.obj "'bare'" 'no UVs' '--unwrap auto' --no-receive
+    refuses 2 bare.obj "'bare'" 'no UVs' '--unwrap auto' --no-receive -- bake bare.obj "${LEVEL[@]}" -o out.exr
 }
 
 @test "a scene's receivers choose objects too, and may overlap on purpose" {
@@ -118,14 +115,11 @@ LIST
 JSON
     succeed bake scene.json --quiet
     sed 's/true/false/' scene.json >refused.json
-    shade bake refused.json --quiet
-    refused 2 level.obj "'roof' on" "over 'wall'"
+    refuses 2 level.obj "'roof' on" "over 'wall'" -- bake refused.json --quiet
     sed 's/fl\*/flo/' scene.json >near.json
-    shade bake near.json
-    refused 2 "'flo'" "did you mean 'floor'?"
+    refuses 2 "'flo'" "did you mean 'floor'?" -- bake near.json
     sed 's/\["fl\*"\]/[]/' scene.json >empty.json
-    shade bake empty.json
-    refused 2 empty.json:2 'receivers[0].objects' 'is empty'
+    refuses 2 empty.json:2 'receivers[0].objects' 'is empty' -- bake empty.json
 }
 
 @test "warnings of a kind are one line with the worst, all of them with --verbose, none with --quiet" {
@@ -155,8 +149,7 @@ JSON
 @test "warnings that were kept come before the error that ends the run" {
     write_level level.obj floor bare naked
     awk '/^o /{n++} n > 1 && /^vt/{next} n > 1 && /^f/{gsub(/\/[0-9]+/, "")} {print}' level.obj >bare.obj
-    shade bake bare.obj "${LEVEL[@]}" --per-object --no-cast '*' -o maps/
-    [ "$status" -eq 2 ] || fail "expected an error"
+    ends 2 bake bare.obj "${LEVEL[@]}" --per-object --no-cast '*' -o maps/
     [[ ${stderr_lines[0]} == *"warning: 2 times"* ]] || fail "lost"
 }
 
@@ -173,12 +166,9 @@ JSON
 
 @test "a channel, a file of points and a UV set that are not there are told with those that are" {
     write_level level.obj floor
-    shade bake level.obj --sun 0,1,0 --ao 1 --pack R=shadow -o out.png
-    refused 2 'no such channel: shadow' 'shadow.sun, ao, A'
-    shade query level.obj --sun 0,1,0 --points level.obj -o out.csv
-    refused 2 level.obj '.csv' "export the mesh's vertices as .ply"
-    shade bake level.obj --ao 1 --uv-set 3 -o out.png
-    refused 2 level.obj 'no UV set 3' 'it has set 0'
+    refuses 2 'no such channel: shadow' 'shadow.sun, ao, A' -- bake level.obj --sun 0,1,0 --ao 1 --pack R=shadow -o out.png
+    refuses 2 level.obj '.csv' "export the mesh's vertices as .ply" -- query level.obj --sun 0,1,0 --points level.obj -o out.csv
+    refuses 2 level.obj 'no UV set 3' 'it has set 0' -- bake level.obj --ao 1 --uv-set 3 -o out.png
 }
 
 @test "info calls a volume of our own no problem" {

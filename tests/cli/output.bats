@@ -1,20 +1,11 @@
 # Where the output cannot go, and that it comes whole or not at all.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
-bake_to() {
-    shade bake box.obj "${SMALL[@]}" -o "$@"
-}
+BAKE=(bake box.obj "${SMALL[@]}" -o)
 
 @test "a folder that does not exist" {
-    bake_to none/out.exr
-    refused 3 none/out.exr
-    bake_to out.exr --stats none/stats.json
-    refused 3 none/stats.json
+    refuses 3 none/out.exr -- "${BAKE[@]}" none/out.exr
+    refuses 3 none/stats.json -- "${BAKE[@]}" out.exr --stats none/stats.json
     [ ! -e out.exr ]
 }
 
@@ -22,54 +13,43 @@ bake_to() {
     [ "$(id -u)" -ne 0 ] || skip "root may write anywhere"
     mkdir shut
     chmod 555 shut
-    bake_to shut/out.exr
+    shade "${BAKE[@]}" shut/out.exr
     chmod 755 shut
     refused 3 shut/out.exr
 }
 
 @test "a folder in place of the output" {
     mkdir out.exr
-    bake_to out.exr
-    refused 3 out.exr
+    refuses 3 out.exr -- "${BAKE[@]}" out.exr
 }
 
 @test "an ending of no known format, and none" {
-    bake_to out.xyz
-    refused 2 out.xyz
-    bake_to out
-    refused 2 out
+    refuses 2 out.xyz -- "${BAKE[@]}" out.xyz
+    refuses 2 out -- "${BAKE[@]}" out
 }
 
 @test "what bake writes is listed with the assets, images alone without them" {
     for out in out.fbx out.psd; do
-        bake_to "$out"
-        refused 2 "expected one of exr, png," "glb, gltf, obj"
+        refuses 2 "expected one of exr, png," "glb, gltf, obj" -- "${BAKE[@]}" "$out"
     done
     refuses 2 out.fbx -- render box.obj "${SMALL[@]}" -o out.fbx
     [[ $stderr != *glb* ]] || fail "render writes no asset"
 }
 
 @test "bits and packings that a format does not have" {
-    bake_to out.png --bits 32
-    refused 2 32
-    bake_to out.png --pack R=shadow.moon
-    refused 2 shadow.moon
+    refuses 2 32 -- "${BAKE[@]}" out.png --bits 32
+    refuses 2 shadow.moon -- "${BAKE[@]}" out.png --pack R=shadow.moon
     no_leftovers
 }
 
 @test "the input, a caster and the scene are never replaced" {
     cp box.obj copy.obj
-    bake_to box.obj
-    refused 2 box.obj
-    bake_to ./box.obj
-    refused 2 box.obj
+    refuses 2 box.obj -- "${BAKE[@]}" box.obj
+    refuses 2 box.obj -- "${BAKE[@]}" ./box.obj
     ln -s copy.obj link.exr
-    bake_to link.exr --caster copy.obj
-    refused 2 link.exr
-    bake_to out.exr --stats box.obj
-    refused 2 box.obj
-    bake_to out.exr --stats out.exr
-    refused 2 out.exr
+    refuses 2 link.exr -- "${BAKE[@]}" link.exr --caster copy.obj
+    refuses 2 box.obj -- "${BAKE[@]}" out.exr --stats box.obj
+    refuses 2 out.exr -- "${BAKE[@]}" out.exr --stats out.exr
     cmp box.obj copy.obj
 }
 
@@ -108,15 +88,13 @@ bake_to() {
 
 @test "a complete run replaces the old output" {
     old_output out.exr
-    bake_to out.exr --quiet
-    done_well
+    succeed "${BAKE[@]}" out.exr --quiet
     [ "$(head -c 4 out.exr | od -An -tx1 | tr -d ' ')" = 762f3101 ] || fail "no EXR"
     [ -z "$stderr" ] || fail "--quiet said something"
     no_leftovers
 }
 
 @test "--output-folder takes all outputs of a scene by their names, and nothing else" {
-    write_box box.obj
     mkdir -p elsewhere maps
     cat >two.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}], "resolution": 16, "ao": {"distance": 1},

@@ -8,8 +8,8 @@ setup() {
     models=$BATS_TEST_DIRNAME/../models
 }
 
-# at_once ARGUMENT…: vdbshade, which is to end by itself soon.
-at_once() {
+# Every run of the program must end by itself soon.
+shade() {
     run --separate-stderr timeout "${VSH_SLOWER:-1}0" "$VDBSHADE" "$@"
     [ "$status" -ne 124 ] || fail "it hung: $*"
 }
@@ -27,33 +27,26 @@ JSON
     for trust in "" "--sandbox off"; do
         for file in waits.csv /dev/zero; do
             scene_of "{\"spheres\": \"$file\"}"
-            at_once bake scene.json $trust
-            refused 3 "$file" "no regular file"
+            refuses 3 "$file" "no regular file" -- bake scene.json $trust
         done
         for caster in '"mesh": "waits.obj"' '"mesh": "waits.glb"' '"mesh": "waits.gltf"' '"mesh": "waits.ply"' \
             '"mesh": "waits.fbx"' '"vdb": "waits.vdb"' '"heightfield": "waits.exr", "size": [1, 1], "height": 1' \
             '"mask": "waits.tif", "size": 1, "thickness": 1' \
             '"text": "a", "font": "waits.ttf", "height": 1, "thickness": 0.1'; do
             scene_of "{$caster}"
-            at_once bake scene.json $trust
-            refused 3 "waits." "no regular file"
+            refuses 3 "waits." "no regular file" -- bake scene.json $trust
         done
         for file in waits.json waits.stl waits.obj waits.png; do
-            at_once info "$file" $trust
-            refused 3 "$file" "no regular file"
+            refuses 3 "$file" "no regular file" -- info "$file" $trust
         done
-        at_once bake waits.json -o out.exr $trust
-        refused 3 "waits.json" "no regular file"
+        refuses 3 "waits.json" "no regular file" -- bake waits.json -o out.exr $trust
     done
-    at_once query box.obj --points waits.csv --ao 1 -o out.csv
-    refused 3 "waits.csv" "no regular file" "--points -"
-    at_once compare out.exr out.exr --tolerances waits.json
-    refused 3 "waits.json" "no regular file"
+    refuses 3 "waits.csv" "no regular file" "--points -" -- query box.obj --points waits.csv --ao 1 -o out.csv
+    refuses 3 "waits.json" "no regular file" -- compare out.exr out.exr --tolerances waits.json
     mkdir folder && mkfifo folder/regress.json
-    at_once regress folder
-    refused 3 "regress.json" "no regular file"
+    refuses 3 "regress.json" "no regular file" -- regress folder
     mkdir other && mkfifo other/a.json
-    at_once regress other
+    shade regress other
     [[ $status -eq 3 && $stderr == *"a.json: cannot be read: it is no regular file"* ]] || fail "regress"
     untouched out.exr
 }
@@ -61,13 +54,10 @@ JSON
 @test "a pipe that a model names is not waited for" {
     cp "$models/scene.gltf" a.gltf
     mkfifo scene.bin a.mtl
-    at_once info a.gltf
-    refused 3 "scene.bin" "no regular file"
+    refuses 3 "scene.bin" "no regular file" -- info a.gltf
     { echo "mtllib a.mtl" && cat box.obj; } >a.obj
-    at_once info a.obj
-    done_well
-    at_once info a.obj --sandbox off
-    done_well
+    succeed info a.obj
+    succeed info a.obj --sandbox off
 }
 
 @test "a model's files lie in its folder, but with --allow-outside" {
@@ -81,10 +71,8 @@ JSON
     local file trust
     for file in a.gltf a.obj b.gltf c.gltf; do
         for trust in "" "--sandbox off"; do
-            at_once info "inside/$file" $trust
-            refused 2 "inside/$file" "outside of its folder" "--allow-outside"
-            at_once info "inside/$file" $trust --allow-outside
-            done_well
+            refuses 2 "inside/$file" "outside of its folder" "--allow-outside" -- info "inside/$file" $trust
+            succeed info "inside/$file" $trust --allow-outside
         done
     done
     # where every file is a link to one store, the model's own place is as good
@@ -92,8 +80,7 @@ JSON
     cp "$models/scene.gltf" d.gltf
     ln -s ../d.gltf links/d.gltf
     ln -s ../scene.bin links/scene.bin
-    at_once info links/d.gltf
-    done_well
+    succeed info links/d.gltf
 }
 
 @test "nothing is told of a file outside that a model does not use" {
@@ -102,16 +89,13 @@ JSON
     echo secret >secret
     sed -e 's|"buffers" : \[|&{"byteLength": 7, "uri": "../secret"},|' -e 's|"buffer" : 0|"buffer" : 1|' \
         "$models/scene.gltf" >inside/a.gltf
-    at_once info inside/a.gltf
-    done_well
-    at_once bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always
-    done_well
+    succeed info inside/a.gltf
+    succeed bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always
     local hash
     hash=$(sha256sum <secret)
     grep -aq "scene.bin" out.exr || fail "the file that is used is not told"
     ! grep -aq "${hash%% *}" out.exr || fail "its hash is told"
     ! grep -aq "secret" out.exr || fail "its name is told"
-    at_once bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always --allow-outside
-    done_well
+    succeed bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always --allow-outside
     grep -aq "${hash%% *}" out.exr || fail "it is not told where it is allowed"
 }

@@ -1,8 +1,6 @@
 # vdbshade query: points in files and pipes.
 load helper
 
-SOURCE=$BATS_TEST_DIRNAME/../..
-
 # The seeds' scene, coarse, and points over its floor.
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
@@ -11,35 +9,13 @@ setup() {
     QUERY=(query scene.json --ao-method taps --quiet)
 }
 
-# compile NAME [SOURCE …]: NAME.c with the library and its headers.
-compile() {
-    local build name=$1
-    shift
-    build=$(dirname "$(realpath "$VDBSHADE")")
-    "${CC:-cc}" -std=gnu11 -O1 ${CFLAGS-} -I"$SOURCE/include" -I"$SOURCE/tests" "$name.c" "$@" -L"$build" -lvdbshade -lm \
-        -Wl,-rpath,"$build" -o "$name"
-}
-
 # points N: raw floats on standard output, a spiral over the floor, normals up or leaning.
 points() {
-    [ -x points ] || {
-        cat >points.c <<'C'
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-int main(int argc, char **argv) {
-    const long count = atol(argv[argc - 1]);
-    for (long i = 0; i < count; ++i) {
-        const double r = 2.4 * sqrt((i + 0.5) / count), a = 2.399963 * i;
-        const float row[6] = {(float)(r * cos(a)), 0.001f, (float)(r * sin(a)), 0.0f, 1.0f, i % 3 == 1 ? 0.1f : 0.0f};
-        fwrite(row, sizeof row, 1, stdout);
-    }
-    return 0;
-}
-C
-        compile points
-    }
-    ./points "$1"
+    perl -e 'my $count = shift;
+        for my $i (0 .. $count - 1) {
+            my ($r, $a) = (2.4 * sqrt(($i + 0.5) / $count), 2.399963 * $i);
+            print pack("f<6", $r * cos($a), 0.001, $r * sin($a), 0, 1, $i % 3 == 1 ? 0.1 : 0);
+        }' "$1"
 }
 
 # What the C API answers for raw rows of 6 floats: shadow, ao, distance, gradient of each, as raw floats.
@@ -85,7 +61,8 @@ int main(int argc, char **argv) {
     return 0;
 }
 C
-    compile api
+    build=$(dirname "$(realpath "$VDBSHADE")")
+    "${CC:-cc}" -std=gnu11 -O1 ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" api.c -L"$build" -lvdbshade -Wl,-rpath,"$build" -o api
     ./api "$1"
 }
 
@@ -96,8 +73,7 @@ ANSWERS=(--distance --gradient --answers-only)
     for method in cone adaptive; do
         api "$method" <p.raw >api.raw
         [ "$(wc -c <api.raw)" -eq 960000 ]
-        shade "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points p.raw --normals yes -o file.raw
-        done_well
+        succeed "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points p.raw --normals yes -o file.raw
         cmp file.raw api.raw
         "$VDBSHADE" "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points - --points-format raw --normals yes -o - \
             <p.raw | cmp - api.raw
@@ -119,67 +95,32 @@ ANSWERS=(--distance --gradient --answers-only)
 @test "threads, batches and memory change no bit" {
     points 40000 >p.raw
     QUERY+=(--method rays --rays 4) # rows are told apart by their numbers
-    shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes -o whole.raw
-    done_well
+    succeed "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes -o whole.raw
     for options in "--threads 1" "--batch 1000" "--batch 7" "--memory-limit 24M"; do
-        shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes $options -o part.raw
-        done_well
+        succeed "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes $options -o part.raw
         cmp part.raw whole.raw || fail "$options"
     done
-    shade "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes --memory-limit 4M -o part.raw
-    refused 4 "memory limit"
+    refuses 4 "memory limit" -- "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes --memory-limit 4M -o part.raw
 }
 
 @test "rows that are kept are answered in batches as long as without them" {
     points 4000 >p.raw
     QUERY+=(--method adaptive --batch 1000 --points p.raw --normals yes) # whose rays depend on the batch
-    shade "${QUERY[@]}" --answers-only -o alone.raw
-    done_well
-    shade "${QUERY[@]}" -o kept.raw
-    done_well
+    succeed "${QUERY[@]}" --answers-only -o alone.raw
+    succeed "${QUERY[@]}" -o kept.raw
     perl -ne 'BEGIN { $/ = \32 } print substr $_, 24' kept.raw | cmp - alone.raw
-}
-
-@test "answers are near the truth" {
-    cat >truth.c <<'C'
-#include "truth/analytic.h"
-#include <math.h>
-#include <stdio.h>
-int main(void) {
-    float row[9];
-    double sum = 0.0, most = 0.0, off = 0.0;
-    long count = 0;
-    while (fread(row, sizeof row, 1, stdin) == 1) { /* x y z nx ny nz, shadow, ao, distance */
-        const double p[3] = {row[0], row[1], row[2]}, n[3] = {row[3], row[4], row[5]};
-        const double lit = truth_light(truth_seeds(), p, n, truth_seeds_sun, truth_seeds_w, INFINITY, 256);
-        const double e = fabs(lit - (double)row[6]);
-        sum += e * e;
-        most = e > most ? e : most;
-        off = fmax(off, fabs(truth_distance(truth_seeds(), p) - (double)row[8]));
-        ++count;
-    }
-    printf("%ld %g %g %g\n", count, sqrt(sum / (double)count), most, off);
-    return !(count == 3000 && sqrt(sum / (double)count) < 0.02 && most < 0.4 && off < 0.05);
-}
-C
-    compile truth "$SOURCE/tests/truth/analytic.c" "$SOURCE/tests/truth/directions.c"
-    points 3000 >p.raw
-    "$VDBSHADE" "${QUERY[@]}" --voxel-size 0.02 --method adaptive --distance --points p.raw --normals yes -o - |
-        ./truth || fail "count, RMSE, worst, distance"
 }
 
 @test "a CSV keeps its rows, whatever their columns, and answers stand behind them" {
     printf 'id;nz;Y;x;z;note;nx;ny\r\n7;0;0.001;0.5;0.5;"a b";0;1\r\n\r\n# a comment\r\n8;0; 0.001 ;"2.1";2;;0;1' >p.csv
-    shade "${QUERY[@]}" --points p.csv -o out.csv
-    done_well
+    succeed "${QUERY[@]}" --points p.csv -o out.csv
     [ "$(cut -d';' -f1-8 out.csv)" = "$(printf 'id;nz;Y;x;z;note;nx;ny\n7;0;0.001;0.5;0.5;"a b";0;1\n8;0; 0.001 ;"2.1";2;;0;1')" ]
     [ "$(head -1 out.csv)" = 'id;nz;Y;x;z;note;nx;ny;shadow.sun;ao' ]
     [[ $(sed -n 2p out.csv) == *';0;0.7054'* ]] || fail "$(cat out.csv)"
     [[ $(sed -n 3p out.csv) == *';1;1' ]] || fail "$(cat out.csv)"
     # blanks and tabs, no header: none out
     printf ' 0.5  0.001 0.5 0 1 0\n2.1 0.001\t2 0 1 0\n' >p.xyz
-    shade "${QUERY[@]}" --points p.xyz -o out.xyz
-    done_well
+    succeed "${QUERY[@]}" --points p.xyz -o out.xyz
     [ "$(cut -d' ' -f9- <out.xyz | head -1)" = "$(sed -n 2p out.csv | cut -d';' -f9- | tr ';' ' ')" ] || fail "$(cat out.xyz)"
     [ "$(wc -l <out.xyz)" -eq 2 ]
 }
@@ -187,25 +128,20 @@ C
 @test "points as far away as a number goes are lit by exact" {
     local far
     for far in 1e15 1e19 1e30 1e300; do printf '%s,%s,0,0,1,0\n-%s,-%s,0,0,1,0\n' $far $far $far $far; done >p.csv
-    shade query "$ASSETS/cloister.glb" --resolution 48 --points p.csv --sun 0.6,0.75,0.5 --sun-angle 3 --ao 0.6 \
+    succeed query "$ASSETS/cloister.glb" --resolution 48 --points p.csv --sun 0.6,0.75,0.5 --sun-angle 3 --ao 0.6 \
         --method exact --ao-method exact --quiet -o out.csv
-    done_well
     awk -F, '$7 != 1 || $8 != 1 { bad = 1 } END { exit bad || NR != 8 }' out.csv
 }
 
 @test "without normals there is no ao, and no horizon" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
-    shade query scene.json --points p.csv -o out.csv
-    done_well
+    succeed query scene.json --points p.csv -o out.csv
     [[ $stderr == *"the points have no normals, so AO is left out"* ]] || fail "no warning"
     [ "$(head -1 out.csv)" = x,y,z,shadow.sun ]
-    shade "${QUERY[@]}" --ao 0.5 --points p.csv -o other.csv
-    refused 2 p.csv normals --ao
+    refuses 2 p.csv normals --ao -- "${QUERY[@]}" --ao 0.5 --points p.csv -o other.csv
     printf '{"casters": [{"sdf": {"shape": "sphere", "radius": 1}}], "voxel_size": 0.1}' >bare.json
-    shade query bare.json --points p.csv -o other.csv --quiet
-    refused 2 "nothing to answer"
-    shade query bare.json --points p.csv --distance -o other.csv --quiet
-    done_well
+    refuses 2 "nothing to answer" -- query bare.json --points p.csv -o other.csv --quiet
+    succeed query bare.json --points p.csv --distance -o other.csv --quiet
     [ "$(head -1 other.csv)" = x,y,z,distance ]
 }
 
@@ -216,17 +152,13 @@ C
     printf "$head${faces}end_header\n%s\n5 5 5\n%s\n%s\n%s\n%s\n3 0 4 3\n3 0 3 2\n3 3 4 5\n" "${corners[@]}" >mesh.ply
     # the normals by hand: those of the floor are twice 2 along y, the wall's is 0.499 along -z
     printf '%s\n' '-1,0.001,-1,0,1,0' '1,0.001,-1,0,1,0' '1,0.001,1,0,8,-0.998' '-1,0.001,1,0,4,-0.998' '-1,0.5,1,0,0,-1' >hand.csv
-    shade "${QUERY[@]}" --method cone --ao 0.6 --points hand.csv --answers-only --format csv -o hand.out
-    done_well
-    shade "${QUERY[@]}" --method cone --ao 0.6 --points mesh.ply --answers-only --format csv -o mesh.out
-    [ "$status" -eq 0 ] || fail "refused"
+    succeed "${QUERY[@]}" --method cone --ao 0.6 --points hand.csv --answers-only --format csv -o hand.out
+    succeed "${QUERY[@]}" --method cone --ao 0.6 --points mesh.ply --answers-only --format csv -o mesh.out
     [[ $stderr == *"row 2: its faces give it no normal"* ]] || fail "no word of the vertex without faces"
     paste -d, hand.out <(sed 3d mesh.out) |
         awk -F, 'NR > 1 && (($1 - $3) ^ 2 > 1e-8 || ($2 - $4) ^ 2 > 1e-8) { exit 1 }' || fail "other answers: $(<mesh.out)"
-    shade "${QUERY[@]}" --ao 0.6 --points mesh.ply --normals no -o no.ply
-    refused 2 mesh.ply normals --ao
-    shade "${QUERY[@]}" --ao 0.6 --points - --points-format ply -o no.ply <mesh.ply
-    refused 2 "need a file"
+    refuses 2 mesh.ply normals --ao -- "${QUERY[@]}" --ao 0.6 --points mesh.ply --normals no -o no.ply
+    refuses 2 "need a file" -- "${QUERY[@]}" --ao 0.6 --points - --points-format ply -o no.ply <mesh.ply
 }
 
 @test "bad rows are told by number and answered nan, the rest as without them" {
@@ -248,11 +180,9 @@ inf,0,0,0,1,0
 1,,1,0,1,0
 1,0x1,1,0,1,0
 CSV
-    shade "${QUERY[@]}" --method cone --points good.csv -o good.out --format csv
-    done_well
+    succeed "${QUERY[@]}" --method cone --points good.csv -o good.out --format csv
     [ -z "$stderr" ] || fail "a clean input is nothing to speak of"
-    shade "${QUERY[@]}" --method cone --points bad.csv -o bad.out --format csv --stats stats.json
-    done_well
+    succeed "${QUERY[@]}" --method cone --points bad.csv -o bad.out --format csv --stats stats.json
     for line in "row 2: 2 columns" "row 3: column 2 is '0,001'" "row 5: x is not finite" "row 6: the normal is zero" \
         "row 8: column 2 is ''" "6 of 9 rows are bad"; do
         [[ $stderr == *"bad.csv: $line"* ]] || fail "says not: $line"
@@ -266,8 +196,7 @@ CSV
     # raw and PLY
     perl -e 'print pack("f<6", @$_, 0.5, 0, 1, 0) for [0.5, 0.001], [9**9**9, 1], [0.5, 0.001];
         print pack("f<6", 1, 2, 3, 0, 0, 0), pack("f<6", 1, 2, 3, 0, -sin(9**9**9), 0)' >bad.raw
-    shade "${QUERY[@]}" --points bad.raw --normals yes -o bad.ply
-    done_well
+    succeed "${QUERY[@]}" --points bad.raw --normals yes -o bad.ply
     for line in "row 2: x is not finite" "row 4: the normal is zero" "row 5: ny is not finite" "3 of 5 rows are bad"; do
         [[ $stderr == *"bad.raw: $line"* ]] || fail "says not: $line"
     done
@@ -275,8 +204,7 @@ CSV
     [[ $stderr == *"bad.ply: 3 of 5 rows are bad"* ]] || fail "PLY"
     [ "$(grep -c '^nan,nan$' again.csv)" -eq 3 ]
     old_output strict.csv
-    shade "${QUERY[@]}" --points bad.csv -o strict.csv --strict
-    refused 2 "row 2: 2 columns"
+    refuses 2 "row 2: 2 columns" -- "${QUERY[@]}" --points bad.csv -o strict.csv --strict
     untouched strict.csv
 }
 
@@ -313,18 +241,13 @@ write_binary_ply() {
     write_binary_ply binary_little_endian '<' >little.ply
     write_binary_ply binary_big_endian '>' >big.ply
     for kind in ascii little big; do
-        shade "${QUERY[@]}" --points "$kind.ply" -o "$kind-out.ply"
-        done_well
-        shade "${QUERY[@]}" --points "$kind.ply" --answers-only -o "$kind.raw"
-        done_well
+        succeed "${QUERY[@]}" --points "$kind.ply" -o "$kind-out.ply"
+        succeed "${QUERY[@]}" --points "$kind.ply" --answers-only -o "$kind.raw"
         cmp "$kind.raw" ascii.raw
         grep -aq '^property float shadow.sun$' "$kind-out.ply" && grep -aq '^comment of ours$' "$kind-out.ply"
-        shade info "$kind-out.ply"
-        [ "$status" -eq 0 ] || fail "$kind"
-        [[ $output == *"triangles: 2"* ]] || fail "$kind: no faces"
+        info_tells "$kind-out.ply" "triangles: 2"
         # what was written is read: its answers are named already
-        shade "${QUERY[@]}" --points "$kind-out.ply" -o again.ply
-        refused 2 shadow.sun --answers-only
+        refuses 2 shadow.sun --answers-only -- "${QUERY[@]}" --points "$kind-out.ply" -o again.ply
         shade "${QUERY[@]}" --points "$kind-out.ply" -o again.raw --answers-only
         cmp again.raw ascii.raw
     done
@@ -341,8 +264,7 @@ write_binary_ply() {
 
 @test "a PLY from rows that are not counted beforehand is the same in a file and a pipe" {
     points 1000 >p.raw
-    shade "${QUERY[@]}" --points p.raw --normals yes -o out.ply
-    done_well
+    succeed "${QUERY[@]}" --points p.raw --normals yes -o out.ply
     "$VDBSHADE" "${QUERY[@]}" --points - --points-format raw --normals yes --format ply -o - <p.raw | cmp - out.ply
     grep -aq '^element vertex 1000$' out.ply
     shade info out.ply
@@ -360,8 +282,7 @@ write_binary_ply() {
     size=$(wc -c <whole.ply)
     for length in $((head + 1)) $((head + 30)) $((head + 4 * 29 - 1)) $((head + 4 * 29)) $((size - 1)); do
         head -c "$length" whole.ply >cut.ply
-        shade "${QUERY[@]}" --points cut.ply -o out.ply
-        refused 3 cut.ply "cut short"
+        refuses 3 cut.ply "cut short" -- "${QUERY[@]}" --points cut.ply -o out.ply
         untouched out.ply
     done
     head -c 40 whole.ply >head.ply
@@ -373,8 +294,7 @@ write_binary_ply() {
     printf 'a,b,c\n1,2,3\n' >none.csv
     local file code what
     while read -r file code what; do
-        shade "${QUERY[@]}" --points "$file" --normals yes -o out.ply
-        refused "$code" "$file" "$what"
+        refuses "$code" "$file" "$what" -- "${QUERY[@]}" --points "$file" --normals yes -o out.ply
     done <<'CASES'
 head.ply 3 end_header
 rows.ply 3 vertex 3 of 4
@@ -403,8 +323,7 @@ CASES
     shade "${QUERY[@]}" --points head.csv -o out.csv
     [ "$(cat out.csv)" = "x,y,z,nx,ny,nz,shadow.sun,ao" ]
     : >empty.ply
-    shade "${QUERY[@]}" --points empty.ply -o out.ply
-    refused 2 empty.ply "empty"
+    refuses 2 empty.ply "empty" -- "${QUERY[@]}" --points empty.ply -o out.ply
 }
 
 @test "one row at a time is answered before the next is there" {
@@ -425,8 +344,7 @@ CASES
 
 @test "nothing but answers goes to standard output" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
-    shade query scene.json --points p.csv --progress -o -
-    [ "$status" -eq 0 ]
+    succeed query scene.json --points p.csv --progress -o -
     [ "${#lines[@]}" -eq 2 ] && [ "${lines[0]}" = x,y,z,shadow.sun ]
     [[ $stderr == *voxelize* ]] || fail "no progress"
 }
@@ -477,8 +395,7 @@ CASES
 
 @test "--error answers what error is left" {
     points 500 >p.raw
-    shade "${QUERY[@]}" --points p.raw --normals yes --method adaptive --max-error 0.05 --error -o out.csv
-    done_well
+    succeed "${QUERY[@]}" --points p.raw --normals yes --method adaptive --max-error 0.05 --error -o out.csv
     [ "$(head -1 out.csv)" = x,y,z,nx,ny,nz,shadow.sun,ao,error.sun ]
     awk -F, 'NR > 1 && !($9 >= 0 && $9 <= 0.3) { bad = 1 } NR > 1 && $9 > 0 { some = 1 } END { exit bad || !some }' out.csv
 }

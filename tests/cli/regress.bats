@@ -19,10 +19,6 @@ scene() {
 JSON
 }
 
-regress() {
-    shade regress scenes "$@"
-}
-
 @test "a scene that would take more than the memory limit is refused before it does" {
     unless_sanitized "its shadow memory does not fit"
     { printf '[{}'; yes ',{}' | head -n 1000000 | tr -d '\n'; printf ']'; } >scenes/bomb.json
@@ -37,67 +33,54 @@ clean() {
 }
 
 @test "a scene without a golden bake is told, and made by --update; then nothing is to be done" {
-    regress
-    [ "$status" -eq 1 ] || fail "expected 1"
+    ends 1 regress scenes
     [[ $output == "box: not alike"*"no golden bake scenes/golden/box.exr"*"--update"* ]] || fail "no hint"
     [ ! -e scenes/golden ] || fail "made a golden bake"
-    regress --update
-    done_well
+    succeed regress scenes --update
     [ -s scenes/golden/box.exr ] || fail "no golden bake"
     [ ! -e scenes/box.exr ] || fail "baked into the scenes' folder"
-    regress
-    done_well
+    succeed regress scenes
     [ "$output" = "box: unchanged" ] || fail "baked again"
-    regress --all
-    done_well
+    succeed regress scenes --all
     [ "$output" = "box: alike" ] || fail "not baked"
     clean
 }
 
 @test "what changed is baked, told, and put in the golden one's place when asked for" {
-    regress --update
+    shade regress scenes --update
     scene other 8
-    regress --update
-    done_well
+    succeed regress scenes --update
     [[ ${lines[0]} == "box: unchanged" && ${lines[1]} == "other: updated" ]] || fail "all were baked"
     cp scenes/golden/box.exr old.exr
     scene box 20
-    regress
-    [ "$status" -eq 1 ] || fail "expected 1"
+    ends 1 regress scenes
     [[ ${lines[0]} == "box: not alike (changed: vdbshade_light_sun)" ]] || fail "what changed"
     [[ $output == *"  box.exr: shadow.sun: not alike: "*penumbrae* ]] || fail "in what"
     [[ $output == *"other: unchanged"* ]] || fail "the other was baked"
     cmp -s scenes/golden/box.exr old.exr || fail "the golden bake was touched"
-    regress
-    [ "$status" -eq 1 ] || fail "what was not alike is baked again"
-    regress --update
-    done_well
+    ends 1 regress scenes
+    succeed regress scenes --update
     [[ $output == *"box: updated"*"  box.exr: shadow.sun: not alike: "*penumbrae* ]] ||
         fail "what moved"
     ! cmp -s scenes/golden/box.exr old.exr || fail "the golden bake stayed"
-    regress
-    done_well
+    succeed regress scenes
     clean
 }
 
 @test "meshes, golden bakes, tolerances and limits count as inputs" {
-    regress --update
+    shade regress scenes --update
     echo '# a comment' >>scenes/box.obj
-    regress
-    done_well
+    succeed regress scenes
     [ "$output" = "box: alike (changed: box.obj)" ] || fail "mesh"
     echo '{"rmse": 0.5}' >scenes/golden/box.exr.tolerance.json
-    regress
-    done_well
+    succeed regress scenes
     [ "$output" = "box: alike (changed: golden box.exr.tolerance.json)" ] || fail "tolerances"
-    regress --max-shift 0.5
-    done_well
+    succeed regress scenes --max-shift 0.5
     [[ $output == "box: alike (changed: limit of shift)" ]] || fail "limits"
-    regress --max-shift 0.5
+    shade regress scenes --max-shift 0.5
     [ "$output" = "box: unchanged" ] || fail "the same limits"
     "$VDBSHADE" bake scenes/box.json --method hard --quiet -o scenes/golden/box.exr
-    regress --max-shift 0.5
-    [ "$status" -eq 1 ] || fail "another golden bake"
+    ends 1 regress scenes --max-shift 0.5
     [[ ${lines[0]} == "box: not alike (changed: golden box.exr)" ]] || fail "another golden bake"
 }
 
@@ -108,55 +91,47 @@ clean() {
             "options": ["--box", "0,1,0,1,2,1", "--box-voxel-size", "0.125"]}]}
 JSON
     scene more 4
-    regress --update
-    done_well
+    succeed regress scenes --update
     [[ $output == "rough: updated"*"air: updated"*"more: updated"* ]] || fail "cases"
     [ -s scenes/golden/rough.exr ] && [ -s scenes/golden/air.vdb ] && [ -s scenes/golden/more.exr ] || fail "bakes"
-    regress --only air --all
-    done_well
+    succeed regress scenes --only air --all
     [ "$output" = "air: alike" ] || fail "others too"
-    regress --only more
+    shade regress scenes --only more
     [ "$output" = "more: unchanged" ] || fail "the cache forgot the others"
     "$VDBSHADE" compare scenes/golden/rough.exr scenes/golden/more.exr --quiet && fail "the options did nothing"
     sed -i 's/"output": "rough.exr"/"output": "more.exr"/' scenes/regress.json
-    regress
-    refused 2 "both 'rough' and 'more' write 'more.exr'"
+    refuses 2 "both 'rough' and 'more' write 'more.exr'" -- regress scenes
     echo '{"cases": [{"scene": "box.json", "optoins": []}]}' >scenes/regress.json
-    regress
-    refused 2 'cases[0]: ' optoins
+    refuses 2 'cases[0]: ' optoins -- regress scenes
     echo '{"cases": [{"scene": "box.json", "command": "volume"}]}' >scenes/regress.json
-    regress
-    [ "$status" -eq 2 ] || fail "expected 2"
+    ends 2 regress scenes
     [[ $stderr == *"nothing says what 'box' writes"* && $output == "box: failed"* ]] || fail "not told"
 }
 
 @test "a scene that cannot be baked fails alone, with the code of its bake" {
     scene broken 5
     sed -i 's/"mesh": "box.obj", "size"/"mesh": "gone.obj", "size"/' scenes/broken.json
-    regress --update
-    [ "$status" -eq 3 ] || fail "expected 3"
+    ends 3 regress scenes --update
     [[ $stderr == *gone.obj* ]] || fail "no reason"
     sed -i 's/gone.obj/box.obj/; s/"resolution": 32/"voxel_size": 1e-9/' scenes/broken.json
-    regress --update --junit out.xml
-    [ "$status" -eq 4 ] || fail "expected 4"
+    ends 4 regress scenes --update --junit out.xml
     [[ $output == "box: "*"broken: failed"*"exit code 4: "*broken.json*"voxels along"* ]] || fail "not told"
     [ -s scenes/golden/box.exr ] || fail "the other was not baked"
     grep -q 'name="broken/broken.exr" tests="1" failures="1"' out.xml || fail "JUnit"
     grep -q 'exit code 4: .*voxels along' out.xml || fail "no reason in JUnit"
-    regress --json
+    shade regress scenes --json
     [[ $output == *'"status": "failed"'*'"exit_code": 4'*'"reason": "'*"voxels along"* ]] || fail "no reason in JSON"
     echo '{"casters": [' >scenes/unread.json
-    regress --json
+    shade regress scenes --json
     [[ $output == *'"reason": "'*unread.json:* ]] || fail "no reason in JSON"
     clean
 }
 
 @test "reports of all cases, and new bakes that are kept" {
     scene other 8
-    regress --update
+    shade regress scenes --update
     scene other 16
-    regress --all --json --junit out.xml --html out.html --bakes new
-    [ "$status" -eq 1 ] || fail "expected 1"
+    ends 1 regress scenes --all --json --junit out.xml --html out.html --bakes new
     [[ $output == *'"name": "box"'*'"status": "alike"'*'"name": "other"'*'"status": "not alike"'* ]] || fail "JSON"
     grep -q '<testsuite name="box/box.exr" tests="3" failures="0"' out.xml || fail "JUnit"
     grep -q '<testsuite name="other/other.exr" tests="3" failures="1"' out.xml || fail "JUnit"
@@ -167,25 +142,20 @@ JSON
 
 @test "a folder without scenes, or without those asked for, is refused" {
     mkdir empty
-    shade regress empty
-    refused 2 'empty: no scenes'
-    regress --only nothing
-    refused 2 "'nothing'"
+    refuses 2 'empty: no scenes' -- regress empty
+    refuses 2 "'nothing'" -- regress scenes --only nothing
 }
 
 @test "a scene that cannot be read fails by itself, a folder that is not there all" {
-    regress --update
-    done_well
+    succeed regress scenes --update
     echo '{"casters": [' >scenes/aa.json
     scene other 8
-    regress --junit out.xml
-    [ "$status" -eq 2 ] || fail "expected 2"
+    ends 2 regress scenes --junit out.xml
     [[ $stderr == *"scenes/aa.json:2:"* ]] || fail "no place"
     [[ $output == "aa: failed"*"aa.json: the bake ended with exit code 2"*"box: unchanged"*"other: not alike"* ]] ||
         fail "not told, or the others were left out"
     [[ $(<out.xml) == *'name="aa'*"failure"* ]] || fail "not in the report"
-    shade regress nowhere
-    refused 3 "nowhere: cannot be read: No such file or directory"
+    refuses 3 "nowhere: cannot be read: No such file or directory" -- regress nowhere
     clean
 }
 
@@ -195,7 +165,7 @@ asking() {
     words=$(printf ', "%s"' "$@")
     printf '{"cases": [{"scene": "box.json"}, {"scene": "box.json", "name": "sly", "command": "%s", "output": "sly.exr", "options": [%s]}]}' \
         "${COMMAND:-bake}" "${words:2}" >scenes/regress.json
-    regress
+    shade regress scenes
 }
 
 @test "a folder's list cannot have files written, or parsed unconfined" {
@@ -217,16 +187,14 @@ asking() {
     [[ $stderr == *"--method '--sandbox': "* ]] || fail "not taken for a value"
     asking --size 8 --method=hard
     [ "$status" -eq 1 ] || fail "options that change values"
-    regress --sandbox off --only sly
-    [ "$status" -eq 1 ] || fail "--sandbox off of regress itself"
+    ends 1 regress scenes --sandbox off --only sly
     [ -z "$(ls elsewhere)" ] || fail "written elsewhere"
     clean
 }
 
 @test "a scene whose name looks like an option is a scene" {
     mv scenes/box.json "scenes/--stats=sly.json"
-    regress --update
-    done_well
+    succeed regress scenes --update
     [[ $output == "--stats=sly: updated"* ]] || fail "not baked"
     [ ! -e sly.json ] && [ ! -e scenes/sly.json ] || fail "taken for an option"
 }

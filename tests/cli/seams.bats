@@ -44,7 +44,6 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
 }
 
 @test "creases have no seams: a box stays as it is" {
-    write_box box.obj
     run -0 "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o plain.exr
     run -0 "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --seams fix -o fixed.exr
     same_values plain.exr fixed.exr
@@ -54,8 +53,7 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
     write_tube tube.obj
     options=(--ao 1 --size 256 --quiet)
     run -0 "$VDBSHADE" bake tube.obj "${options[@]}" --padding 16 -o grown.exr
-    run -0 "$VDBSHADE" info grown.exr
-    [[ $output == *"'ao': min 0, "* ]]
+    info_tells grown.exr "'ao': min 0, "
     run -0 "$VDBSHADE" bake tube.obj "${options[@]}" --padding auto -o filled.exr
     run -0 "$VDBSHADE" info filled.exr
     [[ $output != *"'ao': min 0, "* ]]
@@ -64,28 +62,22 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
 
 @test "what seams and padding may be is said where they are something else" {
     write_tube tube.obj
-    run -2 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --seams stitch -o out.exr
-    [[ $output == *"--seams 'stitch': expected one of default, keep, fix"* ]]
-    run -2 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --padding all -o out.exr
-    [[ $output == *"--padding 'all': expected a whole number from 0 to 4096, or auto"* ]]
-    run -2 "$VDBSHADE" bake tube.obj "${TUBE[@]}" --padding -1 -o out.exr
-    [[ $output == *"--padding '-1': expected a whole number from 0 to 4096, or auto"* ]]
+    refuses 2 "--seams 'stitch': expected one of default, keep, fix" -- bake tube.obj "${TUBE[@]}" --seams stitch -o out.exr
+    refuses 2 "--padding 'all': expected a whole number from 0 to 4096, or auto" -- bake tube.obj "${TUBE[@]}" --padding all -o out.exr
+    refuses 2 "--padding '-1': expected a whole number from 0 to 4096, or auto" -- bake tube.obj "${TUBE[@]}" --padding -1 -o out.exr
     printf '{"casters": [{"mesh": "tube.obj"}], "ao": {"distance": 1},
              "receivers": [{"mesh": "tube.obj", "padding": "all", "output": "out.exr"}]}' >scene.json
-    run -2 "$VDBSHADE" bake scene.json
-    [[ $output == *'scene.json:2:'*'padding: "all" is none of auto, a whole number from 0 to 4096'* ]]
+    refuses 2 'scene.json:2:' 'padding: "all" is none of auto, a whole number from 0 to 4096' -- bake scene.json
     [ ! -e out.exr ]
 }
 
 @test "a face that is hidden where boxes touch takes what is nearest beside it" {
-    write_box box.obj
     # another one on top of it
     { cat box.obj; echo 'o upper'; sed -n 's/^v //p' box.obj | awk '{print "v", $1, $2 + 1, $3}'
       sed -n 's/^f //p' box.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) { split($i, p, "/"); out = out " " p[1] + 8 "/" p[2] } print out }'
     } >two.obj
     for seams in keep fix; do
-        shade bake two.obj --ao 1 --max-error 0.02 --size 128 --unwrap always --seams $seams -o $seams.exr --quiet
-        [ "$status" -eq 0 ] || fail "$stderr"
+        succeed bake two.obj --ao 1 --max-error 0.02 --size 128 --unwrap always --seams $seams -o $seams.exr --quiet
         shade info $seams.exr
         grep -o "'ao': min 0, mean [0-9.]*" <<<"$output" | grep -o '[0-9.]*$' >$seams.mean
     done
@@ -97,20 +89,13 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
 
 # Two tiles of a floor side by side, two objects, and a box that stands over where they meet and only casts.
 write_tiles() {
-    cat >"$1" <<'EOF'
-o left
-v -2 0 -1
-v 0 0 -1
-v 0 0 1
-v -2 0 1
-f 4 3 2 1
-o right
-v 0 0 -1
-v 2 0 -1
-v 2 0 1
-v 0 0 1
-f 8 7 6 5
-EOF
+    {
+        printf 'o left\n'
+        printf 'v %s 0 %s\n' -2 -1 0 -1 0 1 -2 1
+        printf 'f 4 3 2 1\no right\n'
+        printf 'v %s 0 %s\n' 0 -1 2 -1 2 1 0 1
+        printf 'f 8 7 6 5\n'
+    } >"$1"
     write_box box.obj
     awk '/^v / {print "v", $2 - 0.7, $3 + 0.6, $4 - 0.5}' box.obj >>"$1"
     echo 'o box' >>"$1"
@@ -120,8 +105,7 @@ EOF
 @test "borders between two lightmaps are stitched, by no more than the error" {
     write_tiles tiles.obj
     for seams in keep fix; do
-        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.02 --size 48 --unwrap always --per-object --seams $seams -o $seams.exr --quiet
-        [ "$status" -eq 0 ] || fail "$stderr"
+        succeed bake tiles.obj --no-receive box --ao 2 --max-error 0.02 --size 48 --unwrap always --per-object --seams $seams -o $seams.exr --quiet
     done
     for tile in left right; do # which is one chart, without a seam of its own
         run -1 same_values keep.$tile.exr fix.$tile.exr
@@ -133,22 +117,19 @@ EOF
  "receivers": [{"mesh": "tiles.obj", "objects": "left", "unwrap": "always", "size": 48, "seams": "fix", "output": "two.left.exr"},
                {"mesh": "tiles.obj", "objects": "right", "unwrap": "always", "size": 48, "seams": "fix", "output": "two.right.exr"}]}
 EOF
-    shade bake two.json --max-error 0.02 --quiet
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake two.json --max-error 0.02 --quiet
     same_values fix.left.exr two.left.exr
     same_values fix.right.exr two.right.exr
     # threads change nothing
-    shade bake two.json --max-error 0.02 --quiet --threads 3 --output-folder three
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake two.json --max-error 0.02 --quiet --threads 3 --output-folder three
     same_values fix.left.exr three/two.left.exr
 }
 
 @test "planes that memory has no room for lie in a file, and seams between lightmaps are fixed all the same" {
     write_tiles tiles.obj
     tiles() {
-        shade bake tiles.obj --no-receive box --ao 2 --max-error 0.1 --size 1024 --unwrap always --per-object --seams fix --quiet \
+        succeed bake tiles.obj --no-receive box --ao 2 --max-error 0.1 --size 1024 --unwrap always --per-object --seams fix --quiet \
             -o "$1.exr" "${@:2}"
-        [ "$status" -eq 0 ] || fail "$stderr"
     }
     tiles all
     tiles few --memory-limit 40M --threads 1

@@ -41,15 +41,9 @@ tables() {
 }
 
 @test "an option that is refused names itself, its value and what is expected" {
-    write_box box.obj
-    shade bake box.obj --sun 1,1,1 -o out.exr --rays 5000
-    refused 2 "--rays '5000': expected a whole number from 1 to 4096"
-    shade bake box.obj --sun 1,1,1 -o out.exr --size 64x
-    refused 2 "--size '64x': expected W or WxH, each from 1 to 65536 texels"
-    shade volume box.obj --sun 1,1,1 -o out.vdb --method soft
-    refused 2 "--method 'soft': expected one of hard,"
-    shade query box.obj --points p.csv -o out.csv --resolution 1
-    refused 2 "--resolution '1': expected a whole number from 2 to 65536"
-    shade flat flat.json -o out.exr --padding 5000
-    refused 2 "--padding '5000': expected a whole number from 0 to 4096"
+    refuses 2 "--rays '5000': expected a whole number from 1 to 4096" -- bake box.obj --sun 1,1,1 -o out.exr --rays 5000
+    refuses 2 "--size '64x': expected W or WxH, each from 1 to 65536 texels" -- bake box.obj --sun 1,1,1 -o out.exr --size 64x
+    refuses 2 "--method 'soft': expected one of hard," -- volume box.obj --sun 1,1,1 -o out.vdb --method soft
+    refuses 2 "--resolution '1': expected a whole number from 2 to 65536" -- query box.obj --points p.csv -o out.csv --resolution 1
+    refuses 2 "--padding '5000': expected a whole number from 0 to 4096" -- flat flat.json -o out.exr --padding 5000
 }

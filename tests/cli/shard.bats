@@ -115,8 +115,7 @@ load parts
     done
     cmp one.png all.png
     for option in "--invalid x.png" "--view x.html"; do
-        shade bake "${CLOISTER[@]}" -o out.exr --shard 1/3 $option
-        refused 2 "${option% *}" "not together with --shard"
+        refuses 2 "${option% *}" "not together with --shard" -- bake "${CLOISTER[@]}" -o out.exr --shard 1/3 $option
     done
 }
 

@@ -16,32 +16,14 @@ setup() {
 
 # A floor of 6 × 6, and a box without its bottom in it: 4 of 36 of the floor are within.
 write_standing() {
-    cat >"$1" <<'OBJ'
-o floor
-v -3 0 -3
-v 3 0 -3
-v 3 0 3
-v -3 0 3
-vt 0 0
-vt 1 0
-vt 1 1
-vt 0 1
-f 1/1 4/4 3/3 2/2
-o hut
-v -1 -0.1 -1
-v 1 -0.1 -1
-v 1 -0.1 1
-v -1 -0.1 1
-v -1 2 -1
-v 1 2 -1
-v 1 2 1
-v -1 2 1
-f 12 11 10 9
-f 5 9 10 6
-f 6 10 11 7
-f 7 11 12 8
-f 8 12 9 5
-OBJ
+    {
+        printf 'o floor\n'
+        printf 'v %s %s %s\n' -3 0 -3 3 0 -3 3 0 3 -3 0 3
+        printf 'vt %s %s\n' 0 0 1 0 1 1 0 1
+        printf 'f 1/1 4/4 3/3 2/2\no hut\n'
+        printf 'v %s %s %s\n' -1 -0.1 -1 1 -0.1 -1 1 -0.1 1 -1 -0.1 1 -1 2 -1 1 2 -1 1 2 1 -1 2 1
+        printf 'f %s %s %s %s\n' 12 11 10 9 5 9 10 6 6 10 11 7 7 11 12 8 8 12 9 5
+    } >"$1"
 }
 
 @test "texels of a floor below a hut without a floor are hidden" {
@@ -102,12 +84,10 @@ write_studs() {
 }
 
 @test "a pattern that matches nothing is refused with names" {
-    shade voxelize box.obj -o out.vdb --treat 'bix=solid'
-    refused 2 "no object is named 'bix'"
+    refuses 2 "no object is named 'bix'" -- voxelize box.obj -o out.vdb --treat 'bix=solid'
     [[ $stderr == *"did you mean 'box'"* ]] || fail "no name"
     [ ! -e out.vdb ] || fail "written all the same"
-    shade bake box.obj -o out.exr --ao 1 --treat 'none*=room'
-    refused 2 "no object is named 'none*'"
+    refuses 2 "no object is named 'none*'" -- bake box.obj -o out.exr --ao 1 --treat 'none*=room'
 }
 
 @test "casters of a scene say it too" {
@@ -120,6 +100,5 @@ JSON
     [[ $stderr == *"closed over the holes"* ]] || fail "not closed: $stderr"
     [[ $stderr == *"face the other way"* ]] || fail "not inward: $stderr"
     sed -i 's/"solid": "box"/"solid": "bax"/' scene.json
-    shade voxelize scene.json -o out.vdb
-    refused 2 "no object is named 'bax'"
+    refuses 2 "no object is named 'bax'" -- voxelize scene.json -o out.vdb
 }

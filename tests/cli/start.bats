@@ -20,7 +20,6 @@ best() {
 
 @test "a bake of a box into 64² texels takes at most 100 ms, from start to file" {
     unless_sanitized "how long it takes is no sanitizer's claim"
-    write_box box.obj
     local out
     for out in out.exr out.png; do
         best 100 "$VDBSHADE" bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 64 --quiet -o "$out"
@@ -30,7 +29,6 @@ best() {
 
 @test "what a bake of triangles into an EXR or a PNG does not need is not loaded" {
     unless_sanitized "with a sanitizer all is in the program"
-    write_box box.obj
     local out
     for out in out.exr out.png; do
         LD_DEBUG=libs LD_DEBUG_OUTPUT=loaded shade bake box.obj --sun 0.3,1,0.2 --size 64 --quiet -o "$out"

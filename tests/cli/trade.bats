@@ -1,11 +1,6 @@
 # Error against time.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 TINY=(--sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12,24 --truth-rays 64 --budget 60)
 
 # column NAME: that column of trade.csv.
@@ -159,8 +154,7 @@ count() {
 4 'over the memory limit' --size | "${TINY[@]}" --size 2048 --memory-limit 60M -o trade.html
 LIST
     while read -r option value; do
-        shade trade box.obj "${TINY[@]}" -o trade.html "$option" "$value"
-        refused 2 "$option" "$value"
+        refuses 2 "$option" "$value" -- trade box.obj "${TINY[@]}" -o trade.html "$option" "$value"
     done <<'LIST'
 --size 0
 --resolutions 1

@@ -22,23 +22,19 @@ write_two() {
 
 @test "a mesh without lightmap UVs gets some where an asset is written" {
     write_bare box.obj
-    shade bake box.obj "${SMALL[@]}" --ao 1 -o lit.glb
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake box.obj "${SMALL[@]}" --ao 1 -o lit.glb
     grep -aq '"TEXCOORD_0"' lit.glb || fail "no UVs"
     grep -aq '"MOZ_lightmap"' lit.glb || fail "no light"
 }
 
 @test "for an image it gets none unasked, and the error says how" {
     write_bare box.obj
-    shade bake box.obj "${SMALL[@]}" -o x.exr
-    [ "$status" -eq 2 ] || fail "status $status"
+    ends 2 bake box.obj "${SMALL[@]}" -o x.exr
     [[ $stderr == *"--unwrap auto"* ]] || fail "$stderr"
-    shade bake box.obj "${SMALL[@]}" --unwrap auto -o x.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake box.obj "${SMALL[@]}" --unwrap auto -o x.exr
 }
 
 @test "UVs that can be baked are kept, and always replaces them" {
-    write_box box.obj
     "$VDBSHADE" bake box.obj "${SMALL[@]}" -o plain.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap auto -o auto.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap always -o always.exr --quiet
@@ -50,29 +46,24 @@ write_two() {
     write_two two.obj
     shade bake two.obj "${SMALL[@]}" --size 64 -o x.exr
     [ "$status" -ne 0 ] || fail "baked over each other"
-    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap auto -o x.exr --verbose
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake two.obj "${SMALL[@]}" --size 64 --unwrap auto -o x.exr --verbose
     [[ $stderr != *"overlap"* ]] || fail "$stderr"
 }
 
 @test "a density fills as many pages as it takes, each with an image of its own" {
     write_two two.obj
-    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --irradiance \
+    succeed bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --irradiance \
         --ambient 0.25,0.25,0.25 -o x.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
     [ -s x.0.exr ] && [ -s x.1.exr ] && [ ! -e x.exr ] || fail "$(ls)"
-    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --seams keep \
+    succeed bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --seams keep \
         --exr y.exr -o y.glb
-    [ "$status" -eq 0 ] || fail "$stderr"
     [ -s y.glb ] || fail "no asset"
     same_values x.0.exr y.0.exr
     same_values x.1.exr y.1.exr
 }
 
 @test "a mesh that no page can hold lies on several, each triangle on one" {
-    write_box box.obj
-    shade bake box.obj "${SMALL[@]}" --size 32 --unwrap always --texels-per-unit 20 -o x.exr --stats x.json --verbose
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake box.obj "${SMALL[@]}" --size 32 --unwrap always --texels-per-unit 20 -o x.exr --stats x.json --verbose
     [ -s x.5.exr ] && [ ! -e x.6.exr ] || fail "$(ls)"
     [[ $stderr != *"lie over"* ]] || fail "$stderr"
     # six squares of 20 texels and a border
@@ -83,11 +74,8 @@ write_two() {
 }
 
 @test "UVs that can be baked are packed anew where a density is asked for" {
-    write_box box.obj
-    shade bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 8 -o few.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
-    shade bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 8 -o few.exr
+    succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
     # six unit squares
     texels=$(grep -o '"texels": [0-9]*' many.json | grep -o '[0-9]*')
     [ "$texels" -ge 1536 ] && [ "$texels" -le 1850 ] || fail "$texels texels"
@@ -96,12 +84,10 @@ write_two() {
 @test "info tells density and stretch of UVs, and what auto would do" {
     write_two two.obj
     write_bare bare.obj
-    write_box box.obj
     shade info box.obj --size 100
     [[ $output == *"lightmap UVs: 36.12 texels a unit at 100 × 100, stretch 1.048"* ]] || fail "$output"
     [[ $output == *"--unwrap auto: bakes these UVs as they are"* ]] || fail "$output"
-    shade info two.obj
-    [[ $output == *"--unwrap auto: packs usable charts anew"* ]] || fail "$output"
+    info_tells two.obj "--unwrap auto: packs usable charts anew"
     shade info bare.obj
     [[ $output != *"lightmap UVs"* ]] || fail "$output"
     [[ $output == *"--unwrap auto: packs usable charts anew, and makes those of other meshes"* ]] || fail "$output"
@@ -135,11 +121,9 @@ write_uneven() {
 
 @test "of an atlas of objects each has the image that it has alone" {
     write_uneven two.obj
-    shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --per-object -o maps/
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --per-object -o maps/
     [ "$(echo maps/*)" = "maps/box.exr maps/second.exr" ] || fail "$(echo maps/*)"
-    shade bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --receive second -o alone.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake two.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --receive second -o alone.exr
     same_values alone.exr maps/second.exr
 }
 
@@ -150,57 +134,45 @@ write_uneven() {
  "receivers": [{"mesh": "two.obj", "output": "map.png", "unwrap": "always", "atlas": "objects",
                 "texels_per_unit": 8, "max_size": 256, "density": {"*": 0.5, "second": 2}}]}
 EOF
-    shade bake scene.json
-    [ "$status" -eq 0 ] || fail "$stderr"
-    shade info map.box.png
-    [[ $output == *"32 × 16"* ]] || fail "$output"
+    succeed bake scene.json
+    info_tells map.box.png "32 × 16"
     shade info map.second.png
     [[ $output == *"128 × 64"* || $output == *"128 × 128"* ]] || fail "$output"
     [ ! -e map.png ] || fail "$(ls)"
     sed 's/"second": 2/"secnd": 2/' scene.json >bad.json
-    shade bake bad.json
-    refused 2 "no object is named 'secnd'" "did you mean 'second'?" "'box'"
+    refuses 2 "no object is named 'secnd'" "did you mean 'second'?" "'box'" -- bake bad.json
     sed 's/"second": 2/"second": 0/' scene.json >bad.json
-    shade bake bad.json
-    refused 2 density
+    refuses 2 density -- bake bad.json
     sed 's/"density": {[^}]*}/"density": 3/' scene.json >bad.json
-    shade bake bad.json
-    refused 2 density
+    refuses 2 density -- bake bad.json
 }
 
 @test "densities go by name, and a pattern that means none is refused with the names" {
     write_two two.obj
     shade bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --receive second -o plain.exr --stats plain.json
-    shade bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --density 'b*=3' --density 'sec*=2' \
+    succeed bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --density 'b*=3' --density 'sec*=2' \
         --receive second -o dense.exr --stats dense.json
-    [ "$status" -eq 0 ] || fail "$stderr"
     few=$(grep -o '"texels": [0-9]*' plain.json | grep -o '[0-9]*')
     many=$(grep -o '"texels": [0-9]*' dense.json | grep -o '[0-9]*')
     # four times as many, and a border
     [ "$many" -ge $((3 * few)) ] && [ "$many" -le $((4 * few)) ] || fail "$few, then $many texels"
-    shade bake two.obj "${SMALL[@]}" --unwrap always --density 'x*=2' -o x.exr
-    refused 2 two.obj "'x*'" "'box', 'second'"
-    shade bake two.obj "${SMALL[@]}" --unwrap always --density 'box' -o x.exr
-    refused 2 --density PATTERN=X
-    shade bake two.obj "${SMALL[@]}" --unwrap always --density 'box=-1' -o x.exr
-    refused 2 --density
+    refuses 2 two.obj "'x*'" "'box', 'second'" -- bake two.obj "${SMALL[@]}" --unwrap always --density 'x*=2' -o x.exr
+    refuses 2 --density PATTERN=X -- bake two.obj "${SMALL[@]}" --unwrap always --density 'box' -o x.exr
+    refuses 2 --density -- bake two.obj "${SMALL[@]}" --unwrap always --density 'box=-1' -o x.exr
 }
 
 @test "an asset of objects has a lightmap for each, and materials of its own where they show one" {
     write_uneven two.obj
     write_scene fit.json two.obj '' '"atlas": "objects", "max_size": 128, "texels_per_unit": 8, "unwrap": "always"'
     no_sun "${FIT[@]}"
-    shade bake fit.json "${rest[@]}" --ao 1 --seams keep -o lit.gltf --exr all.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake fit.json "${rest[@]}" --ao 1 --seams keep -o lit.gltf --exr all.exr
     for file in lit.lightmap.box.png lit.lightmap.second.png lit.occlusion.second.png all.box.exr all.second.exr; do
         [ -s "$file" ] || fail "no $file: $(ls)"
     done
     grep -q '"lightmap of box"' lit.gltf || fail "no name of an image"
     [ "$(grep -o '"MOZ_lightmap": {' lit.gltf | wc -l)" -eq 2 ] || fail "not two materials: $(cat lit.gltf)"
-    shade info lit.lightmap.box.png
-    [[ $output == *"64 × 32"* ]] || fail "$output"
-    shade info lit.lightmap.second.png
-    [[ $output == *"64 × 64"* ]] || fail "$output"
+    info_tells lit.lightmap.box.png "64 × 32"
+    info_tells lit.lightmap.second.png "64 × 64"
     # the values are those of the images
     shade bake fit.json "${rest[@]}" --ao 1 --irradiance --ambient 0.25,0.25,0.25 -o images.exr
     same_values images.second.exr all.second.exr
@@ -210,19 +182,16 @@ EOF
     write_uneven two.obj
     write_scene fit.json two.obj '' '"atlas": "objects", "max_size": 128, "texels_per_unit": 8, "unwrap": "always"'
     no_sun "${FIT[@]}"
-    shade bake fit.json "${rest[@]}" --ao 1 -o lit.glb --invalid where.png
-    done_well
+    succeed bake fit.json "${rest[@]}" --ao 1 -o lit.glb --invalid where.png
     [ "$(ls where*)" = "$(printf 'where.lit.%s.png\n' box second)" ] || fail "$(ls)"
-    shade bake two.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
-    done_well
+    succeed bake two.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
     [ "$(ls page*)" = "$(printf 'page.lit.%s.png\n' 0 1)" ] || fail "$(ls)"
 }
 
 @test "objects whose UVs each fill the square are lit as they are, with a lightmap for each" {
     write_two two.obj
     "$VDBSHADE" bake two.obj "${SMALL[@]}" --irradiance --ambient 0.25,0.25,0.25 --size 64 --per-object -o maps/ --quiet
-    shade bake two.obj "${SMALL[@]}" --size 64 --per-object --seams keep -o lit.glb --exr all.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake two.obj "${SMALL[@]}" --size 64 --per-object --seams keep -o lit.glb --exr all.exr
     same_values maps/box.exr all.box.exr
     same_values maps/second.exr all.second.exr
     [ "$(grep -ao '"MOZ_lightmap":{' lit.glb | wc -l)" -eq 2 ] || fail "not two materials"
@@ -233,12 +202,9 @@ EOF
     write_two two.obj
     write_scene fit.json two.obj '' '"max_size": 64, "unwrap": "always"'
     no_sun "${FIT[@]}"
-    shade bake fit.json "${rest[@]}" -o x.exr
-    refused 2 max_size texels_per_unit
-    shade bake two.obj "${SMALL[@]}" --per-object --pages 2 --unwrap always -o x.exr
-    refused 2 pages
-    shade bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
-    refused 4 two.obj "'box'" "would fit"
+    refuses 2 max_size texels_per_unit -- bake fit.json "${rest[@]}" -o x.exr
+    refuses 2 pages -- bake two.obj "${SMALL[@]}" --per-object --pages 2 --unwrap always -o x.exr
+    refuses 4 two.obj "'box'" "would fit" -- bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
 }
 
 
@@ -254,8 +220,7 @@ scattered() {
     local bake=(--ao 1 --ao-method taps --resolution 16 -o out.exr) few="charts cover * % of *texels: " size
     # charts of the file's own: a tenth of the square
     printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 0.4 0\nvt 0.4 0.25\nvt 0 0.25\nf 1/1 2/2 3/3 4/4\n' >tenth.obj
-    shade bake tenth.obj "${bake[@]}" --size 64
-    done_well
+    succeed bake tenth.obj "${bake[@]}" --size 64
     [[ $stderr == *$few"--unwrap always packs them anew, or --size 128 gives them more texels"* ]] || fail "$stderr"
     shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always
     [[ $stderr != *"charts cover"* ]] || fail "packed anew: $stderr"
@@ -264,15 +229,13 @@ scattered() {
     shade bake many.obj "${bake[@]}" --size 64 --unwrap auto
     [[ $stderr == *$few"padding takes most of the image, so use --size "* ]] || fail "$stderr"
     size=$(sed -n 's/.*so use --size //p' <<<"$stderr")
-    shade bake many.obj "${bake[@]}" --size "$size" --unwrap auto
-    done_well
+    succeed bake many.obj "${bake[@]}" --size "$size" --unwrap auto
     [[ $stderr != *"charts cover"* ]] || fail "--size $size: $stderr"
     # a density that is too low for the size
     shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always --texels-per-unit 8
     [[ $stderr == *$few"use a smaller --size, or --texels-per-unit "* ]] || fail "$stderr"
     size=$(sed -n 's/.*--texels-per-unit //p' <<<"$stderr")
-    shade bake tenth.obj "${bake[@]}" --size 64 --unwrap always --texels-per-unit "$size"
-    done_well
+    succeed bake tenth.obj "${bake[@]}" --size 64 --unwrap always --texels-per-unit "$size"
     # the chosen objects share the layout with others
     { sed 's/^f/o tenth\nf/' tenth.obj; echo 'o other'; echo 'f 1/1 2/2 3/3'; } >two.obj
     shade bake two.obj "${bake[@]}" --size 64 --receive tenth

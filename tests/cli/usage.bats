@@ -64,14 +64,11 @@ fits() {
 @test "no command, an unknown command and an unknown option are usage errors" {
     shade
     refused 2 'no command'
-    shade backe
-    refused 2 "did you mean bake?"
-    shade --verson
-    refused 2 --verson
+    refuses 2 "did you mean bake?" -- backe
+    refuses 2 --verson -- --verson
 }
 
 @test "an unknown option suggests the nearest" {
-    write_box box.obj
     refuse_each bake box.obj -o out.exr <<'LIST'
 2 'did you mean --resolution?' | --resolutoin 5
 2 'bake --help' | --zzzzzzzzzz
@@ -80,13 +77,10 @@ LIST
 }
 
 @test "an abbreviated option is refused, as the next version may have another of that beginning" {
-    write_box box.obj
-    shade bake box.obj -o out.exr --resol 24 --ao 1
-    refused 2 --resol
+    refuses 2 --resol -- bake box.obj -o out.exr --resol 24 --ao 1
 }
 
 @test "a missing value, a value too many and an operand too many are usage errors" {
-    write_box box.obj
     refuse_each bake <<'LIST'
 2 '-o' value | box.obj -o
 2 '--sun' value | box.obj -o out.exr --sun
@@ -97,11 +91,9 @@ LIST
 }
 
 @test "numbers are taken strictly" {
-    write_box box.obj
     old_output out.exr
     while read -r option value; do
-        shade bake box.obj -o out.exr "${SMALL[@]}" "$option" "$value"
-        refused 2 "$option" "$value"
+        refuses 2 "$option" "$value" -- bake box.obj -o out.exr "${SMALL[@]}" "$option" "$value"
     done <<'LIST'
 --ao 0
 --ao -1
@@ -146,13 +138,11 @@ LIST
 --memory-limit 5T
 --memory-limit many
 LIST
-    shade bake box.obj -o out.exr "${SMALL[@]}" --ao ''
-    refused 2 --ao
+    refuses 2 --ao -- bake box.obj -o out.exr "${SMALL[@]}" --ao ''
     untouched out.exr
 }
 
 @test "an unknown method is refused with the list of those there are" {
-    write_box box.obj
     old_output out.exr
     for method in magic ray; do
         shade bake box.obj -o out.exr "${SMALL[@]}" --method "$method"
@@ -162,7 +152,6 @@ LIST
 }
 
 @test "what a method does not use is refused beside it" {
-    write_box box.obj
     refuse_each bake box.obj -o out.exr "${SMALL[@]}" <<'LIST'
 2 --rays cone 'rays, adaptive and exact' | --rays 8 --method cone
 2 --error smooth | --error --method smooth
@@ -171,7 +160,6 @@ LIST
 }
 
 @test "a mesh needs something to bake" {
-    write_box box.obj
     refuse_each bake box.obj <<'LIST'
 2 --sun --ao | -o out.exr
 2 --sun-angle | -o out.exr --ao 1 --sun-angle 5
@@ -182,13 +170,10 @@ LIST
 }
 
 @test "voxel size and resolution exclude each other" {
-    write_box box.obj
-    shade bake box.obj -o out.exr --ao 1 --resolution 24 --voxel-size 0.1
-    refused 2 --resolution --voxel-size
+    refuses 2 --resolution --voxel-size -- bake box.obj -o out.exr --ao 1 --resolution 24 --voxel-size 0.1
 }
 
 @test "-q and -v are --quiet and --verbose, together with other letters too" {
-    write_box box.obj
     succeed bake box.obj "${SMALL[@]}" -qo out.exr
     [ -z "$stderr" ]
     succeed bake box.obj "${SMALL[@]}" -v -o told.exr

@@ -2,7 +2,6 @@
 load helper
 
 @test "a picture and a channel show the texels that are in another solid, and one line tells of them" {
-    write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     write_scene box.json box.obj '"invalid": true'
     succeed bake box.json --caster above.obj --ao 0.5 --method exact --ao-method exact --size 64 --resolution 24 \
@@ -11,14 +10,12 @@ load helper
         fail "not told"
     run -0 "$VDBSHADE" info box.exr
     [[ $output == *"'invalid': min 0, "*", max 1"* ]]
-    run -0 "$VDBSHADE" info where.png
-    [[ $output == *"64 × 64"* ]]
+    info_tells where.png "64 × 64"
     [[ $output == *"'R'"*"'G'"*"'B'"* ]]
     no_leftovers
 }
 
 @test "texels in a solid that lacks a side are 1 in the channel, and no line says that they are seen" {
-    write_box box.obj
     # A bar sticks out of the larger box through its wall. The box lacks the opposite side; a sheet stands before the gap.
     awk '$1 == "v" { print "v", $2, $3, 5 * $4; next } { print }' box.obj >bar.obj
     awk '/^o/ { print "o around"; next } /^f/ && left++ < 2 { next }
@@ -32,36 +29,28 @@ load helper
 }
 
 @test "a bake whose every texel is in a solid is refused, and the old output stays" {
-    write_box box.obj
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
     old_output out.exr
     # what everything else lies within is a sky dome, unless it is said to be solid
-    shade bake box.obj --caster around.obj --treat box=solid --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 \
-        -o out.exr
-    refused 2 box.obj "inside solids" info
+    refuses 2 box.obj "inside solids" info -- \
+        bake box.obj --caster around.obj --treat box=solid --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 -o out.exr
     untouched out.exr
 }
 
 @test "a bake of no texel is refused: UVs without area, or all outside the square" {
-    write_box box.obj
     old_output out.exr
     sed 's/^vt .*/vt 0.5 0.5/' box.obj >flat.obj
-    shade bake flat.obj "${SMALL[@]}" -o out.exr
-    refused 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set"
+    refuses 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set" -- bake flat.obj "${SMALL[@]}" -o out.exr
     awk '$1 == "vt" { print "vt", $2 + 2, $3; next } { print }' box.obj >far.obj
-    shade bake far.obj "${SMALL[@]}" -o out.exr
-    refused 2 far.obj "cover none of 32 × 32 texels" "leave the unit square"
+    refuses 2 far.obj "cover none of 32 × 32 texels" "leave the unit square" -- bake far.obj "${SMALL[@]}" -o out.exr
     untouched out.exr
 }
 
 @test "the picture is a PNG" {
-    write_box box.obj
-    shade bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
-    refused 2 --invalid where.jpg .png
+    refuses 2 --invalid where.jpg .png -- bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
 }
 
 @test "pictures of outputs of one name in several folders have names of their own" {
-    write_box box.obj
     mkdir a b c d
     local output outputs=()
     for output in a/wall.exr b/wall.exr c/wall-2.exr d/Wall.exr; do
@@ -72,13 +61,11 @@ load helper
     [ "$(ls where* | wc -l)" -eq 4 ] || fail "$(ls)"
     local name
     for name in wall:32 wall-3:40 wall-2:48 Wall-4:56; do
-        shade info "where.${name%:*}.png"
-        [[ $output == *"${name#*:} × ${name#*:}"* ]] || fail "$name: $output"
+        info_tells "where.${name%:*}.png" "${name#*:} × ${name#*:}"
     done
 }
 
 @test "charts closer than a texel are told of, and from which size on they are apart" {
-    write_box box.obj
     succeed bake box.obj "${SMALL[@]}" --size 16 -o out.exr
     [[ $stderr == *"charts lie closer than a texel"*"mesh 'box'"*"from --size 2"[56]" on"* ]] || fail "not told"
     succeed bake box.obj "${SMALL[@]}" --size 26 -o out.exr
@@ -90,7 +77,6 @@ load helper
 }
 
 @test "with nothing said rays decide what is valid, as with exact, and voxels do not" {
-    write_box box.obj
     awk '$1 == "v" { print "v", $2, $3 + 0.25, $4; next } { print }' box.obj >above.obj
     options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --quiet)
     succeed bake box.obj "${options[@]}" --resolution 8 -o auto.exr

@@ -53,8 +53,7 @@ blend() {
 
 # bake FILE OUT [options]
 bake() {
-    shade bake "$1" --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o "$2" "${@:3}"
-    [ "$status" -eq 0 ] || fail "$1"
+    succeed bake "$1" --sun 0,1,0 --sun-angle 1 --size 96 --receive floor -o "$2" "${@:3}"
 }
 
 # lit FILE SHARE: of the floor in 1 / 100
@@ -97,8 +96,7 @@ same() {
 
 @test "where all vertices have one alpha it is a factor" {
     write_leaf faint.gltf "$(mask 0.5)" "$FAINT"
-    shade bake faint.gltf --sun 0,1,0 --receive floor --size 16 -o faint.exr
-    [ "$status" -eq 0 ] || fail "$stderr"
+    succeed bake faint.gltf --sun 0,1,0 --receive floor --size 16 -o faint.exr
     lit faint.exr 100
     write_leaf faint.gltf "$(mask 0.25 "$TEXTURE")" "$FAINT"
     write_leaf factor.gltf "$(mask 0.25 "$TEXTURE, \"baseColorFactor\": [1, 1, 1, 0.4]")" "$WHOLE"

@@ -209,8 +209,7 @@ PY
     cp "$ASSETS/seeds.json" .
     for option in "--planes box.exr" "--other-planes box.exr" "--uv-set 1" box.obj; do
         # shellcheck disable=SC2086
-        shade view seeds.json $option -o page.html
-        refused 2 seeds.json 'takes no OTHER'
+        refuses 2 seeds.json 'takes no OTHER' -- view seeds.json $option -o page.html
     done
     refuses 3 gone.json -- view gone.json -o page.html
     echo '{"casters": [{"mesh": "gone.obj"}], "ao": {"distance": 1}}' >other.json

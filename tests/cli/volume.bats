@@ -102,12 +102,10 @@ info() {
 2 'nothing to bake' | box.obj -o out.vdb
 LIST
     for box in 0,0,0,1,1 0,0,0,1,0,1 0,0,0,1,-1,1 0,0,nan,1,1,1 0,0,0,1,1,1,1 a; do
-        shade volume scene.json -o out.vdb --box "$box"
-        refused 2 --box "$box"
+        refuses 2 --box "$box" -- volume scene.json -o out.vdb --box "$box"
     done
     for size in 0 -1 nan 1x; do
-        shade volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
-        refused 2 --box-voxel-size
+        refuses 2 --box-voxel-size -- volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
     done
     refuse_each volume scene.json -o <<'LIST'
 2 'no --box' | out.vdb --box-voxel-size 1
@@ -132,10 +130,8 @@ LIST
 3 scene.json | scene.json
 LIST
     head -c 300 ls.vdb >cut.vdb
-    shade volume scene.json -o out.vdb --like cut.vdb
-    refused 3 cut.vdb
-    shade volume scene.json -o ls.vdb --like ls.vdb
-    refused 2 ls.vdb --like
+    refuses 3 cut.vdb -- volume scene.json -o out.vdb --like cut.vdb
+    refuses 2 ls.vdb --like -- volume scene.json -o ls.vdb --like ls.vdb
     untouched out.vdb
 }
 
@@ -175,8 +171,7 @@ LIST
  "voxel_size": 0.05, "lights": [{"name": "top", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}]}
 JSON
     run -0 "$VDBSHADE" volume scene.json --box -1,0.1,-1,1,0.6,1 -o fog.vdb --quiet
-    run -0 "$VDBSHADE" info fog.vdb
-    [[ $output == *"grid 'shadow.top'"* ]]
+    info_tells fog.vdb "grid 'shadow.top'"
     # the column under the ball is dark: 1 - pi / 64 of the box is lit
     printf '0 0.5 0\n0.5 0.5 0.5\n' >points.csv
     run --separate-stderr -0 "$VDBSHADE" query scene.json --points points.csv -o - --answers-only --quiet

@@ -1,11 +1,6 @@
 # voxelize: meshes and scenes to level sets.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
-}
-
 @test "a mesh becomes a level set of the voxel size and band asked for" {
     succeed voxelize box.obj -o out.vdb --voxel-size 0.04 --half-width 5
     [[ $stderr == *"out.vdb: voxel 0.04, "*"active voxels"* ]] || fail "no summary"
@@ -68,8 +63,7 @@ LIST
             fi
         done
     done
-    shade query no.vdb:hull --points points.csv --distance -o out.csv
-    refused 3 no.vdb
+    refuses 3 no.vdb -- query no.vdb:hull --points points.csv --distance -o out.csv
     mv box.vdb 'a.vdb:hull.vdb'
     succeed query a.vdb:hull.vdb --points points.csv --distance -o out.csv
     succeed query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
