@@ -42,10 +42,14 @@ static inline vsh_compared pair_of(const plane *golden, const plane *values, con
     return c;
 }
 
+/* Also checks that the number of threads changes no bit. */
 static inline vsh_measures measure(const plane *golden, const plane *values, const uint8_t *mask) {
     const vsh_compared c = pair_of(golden, values, mask);
-    vsh_measures m;
-    assert_ok(vsh_compare(&c, NULL, NULL, &m, &failure));
+    const vsh_run one = run_on(1), four = run_on(4);
+    vsh_measures m = {0}, other = {0};
+    assert_ok(vsh_compare(&c, NULL, &one, &m, &failure));
+    assert_ok(vsh_compare(&c, NULL, &four, &other, &failure));
+    assert_memory_equal(&m, &other, sizeof m);
     return m;
 }
 

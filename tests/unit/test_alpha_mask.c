@@ -19,28 +19,6 @@ static bool blocked(const vsh_triangles *triangles, const double from[3], const 
 
 /* --- shadows and AO */
 
-TEST(a_masked_card_casts_the_shadow_of_its_disc) {
-    FREED card *c = card_at(1.0f);
-    OWNED(vsh_triangles) *triangles = traced_of(&c->mesh, 1);
-    const double directions[3][3] = {{0.0, 1.0, 0.0}, {0.6, 0.8, 0.0}, {-0.48, 0.6, 0.64}};
-    int dark = 0, lit = 0;
-    for (int i = 0; i < 3 * 41 * 41; ++i) {
-        const double *d = directions[i % 3];
-        const double x = -1.2 + 0.06 * (i / 3 % 41), z = -1.2 + 0.06 * (i / 123);
-        const double from[3] = {x - d[0] / d[1], 0.0, z - d[2] / d[1]};
-        const double off = hypot(x, z) - DISC_RADIUS;
-        if (fabs(off) > 1e-3) {
-            assert_int_equal(blocked(triangles, from, d), off < 0.0);
-            dark += off < 0.0;
-            lit += fabs(x) < 1.0 && fabs(z) < 1.0 && off > 0.0;
-        }
-    }
-    assert_true(dark > 500 && lit > 300);
-    /* and from above */
-    assert_true(blocked(triangles, (const double[]){0, 2, 0}, (const double[]){0, -1, 0}));
-    assert_false(blocked(triangles, (const double[]){0.9, 2, 0.9}, (const double[]){0, -1, 0}));
-}
-
 TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
     enum { POINTS = 200, RAYS = 1024 };
     FREED card *c = card_at(0.7f);

@@ -33,13 +33,6 @@ static double ao_at(const vsh_field *field, int32_t cones, double distance, cons
     return (double)ao;
 }
 
-/* A place on the floor of the room of hollow_box(). */
-static void draw_in_room(uint64_t *counter, double p[3]) {
-    p[0] = between(counter, -0.95, 0.95);
-    p[1] = -0.999;
-    p[2] = between(counter, -0.95, 0.95);
-}
-
 /* Points of a floor that look up, and what they see. */
 typedef struct places {
     double positions[3 * TEXELS];
@@ -220,8 +213,8 @@ TEST(what_is_beyond_the_distance_hides_nothing) {
     assert_less(ao_at(field, 0, 1.0, p), 1.0);
 }
 
-/* Means over a room's floor, and the brightest point of it. No cone finds a wall deep that is thinner than it
- * is wide, but none finds it open either. */
+/* Means over the floor of the room of hollow_box(), and the brightest point of it. No cone finds a wall deep
+ * that is thinner than it is wide, but none finds it open either. */
 TEST(a_closed_room_is_dark) {
     static const struct {
         double wall, mean[2], brightest[2]; /* by 16 cones, and by 64 */
@@ -235,9 +228,8 @@ TEST(a_closed_room_is_dark) {
             uint64_t counter = 2;
             double mean = 0.0, brightest = 0.0;
             for (int k = 0; k < 200; ++k) {
-                double p[3];
-                draw_in_room(&counter, p);
-                const double ao = ao_at(field, fine ? 64 : 16, 10.0, p);
+                const double x = between(&counter, -0.95, 0.95), z = between(&counter, -0.95, 0.95);
+                const double ao = ao_at(field, fine ? 64 : 16, 10.0, (const double[]){x, -0.999, z});
                 mean += 0.005 * ao;
                 brightest = fmax(brightest, ao);
             }
@@ -276,23 +268,6 @@ TEST(farther_distances_hide_more) {
 }
 
 /* --- rays */
-
-TEST(rays_find_a_closed_room_dark_however_thin_its_walls) {
-    for (int w = 0; w < 2; ++w) {
-        OWNED(vsh_field) *field = hollow_box(0.04, w == 0 ? 0.1 : 0.5);
-        uint64_t counter = 2;
-        for (int i = 0; i < 100; ++i) {
-            double p[3];
-            draw_in_room(&counter, p);
-            for (int32_t method = VSH_AO_RAYS; method <= VSH_AO_ADAPTIVE; ++method) {
-                const vsh_shade_options options = options_of(method, 256, 10.0);
-                float ao = -1.0f;
-                shade(occluders_of(field), &options, 1, p, UP, &ao, NULL);
-                assert_true(ao == 0.0f);
-            }
-        }
-    }
-}
 
 TEST(more_rays_come_nearer_to_the_truth) {
     static const double bounds[3][3] = {{0.045, 0.018, 0.0085}, {0.066, 0.033, 0.017}, {0.052, 0.022, 0.011}};

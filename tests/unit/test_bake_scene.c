@@ -180,24 +180,4 @@ TEST(what_cannot_be_is_refused_before_a_file_is_read) {
     assert_int_equal(vsh_receiver_check(&c.scene, 0, &failure), VSH_ERROR_ARGUMENT);
 }
 
-TEST(lightmaps_of_objects_have_their_names) {
-    case_scene c;
-    fill(&c, SIZE, 1.0);
-    c.receiver.atlas = VSH_ATLAS_OBJECTS;
-    loading l = {.refuses = 1};
-    vsh_bake_options options = vsh_bake_options_default();
-    options.loaded = note_loaded;
-    options.user = &l;
-    static const char *const outputs[2] = {"of.exr", "of-%s.exr"};
-    static const char *const named[2] = {"of.defaultobject.exr", "of-defaultobject.exr"};
-    for (int i = 0; i < 2; ++i) {
-        char output[300];
-        snprintf(output, sizeof output, "%s", at(outputs[i]));
-        c.receiver.output = output;
-        assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_INPUT);
-        assert_int_equal(l.count, 1);
-        assert_string_equal(l.output, at(named[i]));
-    }
-}
-
 FIXTURE(make_folder, remove_folder)

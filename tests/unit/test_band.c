@@ -1,90 +1,56 @@
 /* The band of a mesh, voxel by voxel: distances against every triangle, sides against counted crossings. */
 #include "grids.h"
-#include "testing.h"
-
+#include "mesh/mesh.h"
 #include "shapes.h"
+#include "testing.h"
 
 #define ERROR_MOST 1e-3 /* voxels */
 
-static double dot3(const double a[3], const double b[3]) {
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+static double to_segment(vshi_vec p, vshi_vec a, vshi_vec b) {
+    const vshi_vec ab = vshi_sub(b, a), ap = vshi_sub(p, a);
+    const double length = vshi_dot(ab, ab);
+    const double t = length > 0.0 ? fmin(fmax(vshi_dot(ap, ab) / length, 0.0), 1.0) : 0.0;
+    return vshi_length(vshi_sub(ap, vshi_scale(ab, t)));
 }
 
-static void sub3(const double a[3], const double b[3], double to[3]) {
-    for (int i = 0; i < 3; ++i) {
-        to[i] = a[i] - b[i];
-    }
-}
-
-static double to_segment(const double p[3], const double a[3], const double b[3]) {
-    double ab[3], ap[3], off[3];
-    sub3(b, a, ab);
-    sub3(p, a, ap);
-    const double length = dot3(ab, ab);
-    const double t = length > 0.0 ? fmin(fmax(dot3(ap, ab) / length, 0.0), 1.0) : 0.0;
-    for (int i = 0; i < 3; ++i) {
-        off[i] = ap[i] - t * ab[i];
-    }
-    return sqrt(dot3(off, off));
-}
-
-static void corners_of(const shape *s, size_t triangle, double corner[3][3]) {
-    for (int k = 0; k < 3; ++k) {
-        for (int i = 0; i < 3; ++i) {
-            corner[k][i] = (double)s->positions[s->indices[triangle][k]][i];
-        }
-    }
-}
-
-static void cross3(const double a[3], const double b[3], double to[3]) {
-    to[0] = a[1] * b[2] - a[2] * b[1];
-    to[1] = a[2] * b[0] - a[0] * b[2];
-    to[2] = a[0] * b[1] - a[1] * b[0];
-}
-
-/* By solving for the plane's foot; where it is not inside, an edge is the nearest. */
-static double to_triangle(const double p[3], double corner[3][3]) {
-    double u[3], v[3], w[3], normal[3], uw[3], wv[3];
-    sub3(corner[1], corner[0], u);
-    sub3(corner[2], corner[0], v);
-    sub3(p, corner[0], w);
-    cross3(u, v, normal);
-    cross3(u, w, uw);
-    cross3(w, v, wv);
-    const double area = dot3(normal, normal);
-    const double b = dot3(uw, normal), c = dot3(wv, normal);
+/* Solves for the foot of p on the plane; if that is outside the triangle, an edge is the nearest. */
+static double to_triangle(vshi_vec p, const vshi_vec corner[3]) {
+    const vshi_vec u = vshi_sub(corner[1], corner[0]), v = vshi_sub(corner[2], corner[0]),
+                   w = vshi_sub(p, corner[0]), normal = vshi_cross(u, v);
+    const double area = vshi_dot(normal, normal), b = vshi_dot(vshi_cross(u, w), normal),
+                 c = vshi_dot(vshi_cross(w, v), normal);
     if (area > 0.0 && b >= 0.0 && c >= 0.0 && b + c <= area) {
-        return fabs(dot3(w, normal)) / sqrt(area);
+        return fabs(vshi_dot(w, normal)) / sqrt(area);
     }
     return fmin(to_segment(p, corner[0], corner[1]),
                 fmin(to_segment(p, corner[1], corner[2]), to_segment(p, corner[2], corner[0])));
 }
 
 static double to_shape(const double p[3], const shape *s) {
+    const vsh_mesh mesh = shape_mesh(s, "shape");
     double least = DBL_MAX;
     for (size_t i = 0; i < s->triangles; ++i) {
-        double corner[3][3];
-        corners_of(s, i, corner);
-        least = fmin(least, to_triangle(p, corner));
+        vshi_vec corner[3];
+        vshi_mesh_triangle(&mesh, i, corner);
+        least = fmin(least, to_triangle(vshi_vec_of(p), corner));
     }
     return least;
 }
 
 /* Whether a ray from p crosses an odd number of triangles. */
 static int is_inside(const double p[3], const shape *s) {
-    const double direction[3] = {0.331662, 0.712317, 0.618583};
+    const vshi_vec direction = {0.331662, 0.712317, 0.618583};
+    const vsh_mesh mesh = shape_mesh(s, "shape");
     int odd = 0;
     for (size_t i = 0; i < s->triangles; ++i) {
-        double corner[3][3], u[3], v[3], w[3], dv[3], wu[3];
-        corners_of(s, i, corner);
-        sub3(corner[1], corner[0], u);
-        sub3(corner[2], corner[0], v);
-        sub3(p, corner[0], w);
-        cross3(direction, v, dv);
-        cross3(w, u, wu);
-        const double scale = 1.0 / dot3(u, dv);
-        const double a = scale * dot3(w, dv), b = scale * dot3(direction, wu);
-        odd ^= a >= 0.0 && b >= 0.0 && a + b <= 1.0 && scale * dot3(v, wu) > 0.0;
+        vshi_vec corner[3];
+        vshi_mesh_triangle(&mesh, i, corner);
+        const vshi_vec u = vshi_sub(corner[1], corner[0]), v = vshi_sub(corner[2], corner[0]),
+                       w = vshi_sub(vshi_vec_of(p), corner[0]), wu = vshi_cross(w, u),
+                       dv = vshi_cross(direction, v);
+        const double scale = 1.0 / vshi_dot(u, dv), a = scale * vshi_dot(w, dv),
+                     b = scale * vshi_dot(direction, wu);
+        odd ^= a >= 0.0 && b >= 0.0 && a + b <= 1.0 && scale * vshi_dot(v, wu) > 0.0;
     }
     return odd;
 }
@@ -247,14 +213,12 @@ static double to_faces(const double p[3], const bounds *b, const bounds *other, 
         q[axis] = face % 2 == 0 ? b->low[axis] : b->high[axis];
         for (q[u] = b->low[u]; q[u] <= b->high[u] + 1e-9; q[u] += step) {
             for (q[v] = b->low[v]; q[v] <= b->high[v] + 1e-9; q[v] += step) {
-                double off[3];
-                sub3(p, q, off);
-                const double length = dot3(off, off);
+                const double length = vshi_length(vshi_sub(vshi_vec_of(p), vshi_vec_of(q)));
                 least = length < least && !is_in_box(q, other, -1e-9) ? length : least;
             }
         }
     }
-    return sqrt(least);
+    return least;
 }
 
 /* Depth in a union is to its own surface, wherever its parts have theirs; within two voxels of where those

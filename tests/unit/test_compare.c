@@ -145,25 +145,6 @@ TEST(coverage_is_counted_and_becomes_a_mask) {
 
 /* --- calls */
 
-TEST(the_same_bits_for_any_number_of_threads) {
-    FREED_BY(free_plane)
-    plane golden = make_plane(WIDTH, HEIGHT, 1, wavy, NULL),
-          values = make_plane(WIDTH, HEIGHT, 1, wavy, NULL);
-    for (uint32_t i = 0; i < COUNT; ++i) {
-        values.values[i] = (float)((double)values.values[i] + 0.2 * noise(i));
-    }
-    const vsh_compared c = pair_of(&golden, &values, NULL);
-    vsh_measures first, other;
-    memset(&first, 0, sizeof first);
-    vsh_run run = run_on(1);
-    assert_ok(vsh_compare(&c, NULL, &run, &first, &failure));
-    for (run.threads = 2; run.threads <= 8; run.threads *= 2) {
-        memset(&other, 0, sizeof other);
-        assert_ok(vsh_compare(&c, NULL, &run, &other, &failure));
-        assert_memory_equal(&first, &other, sizeof first);
-    }
-}
-
 static int32_t stop(void *user, const char *stage, double fraction) {
     *(int *)user += strcmp(stage, "compare") == 0;
     return 1;
@@ -191,8 +172,6 @@ TEST(bad_calls_are_refused_by_name) {
         options.reach = cases[i].reach;
         assert_fails(vsh_compare(&c, &options, NULL, &m, &failure), VSH_ERROR_ARGUMENT, cases[i].word);
     }
-    assert_int_equal(vsh_compare(NULL, NULL, NULL, &m, NULL), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_compare(&good, NULL, NULL, NULL, NULL), VSH_ERROR_ARGUMENT);
     vsh_run run = run_within(COUNT * 20);
     assert_int_equal(vsh_compare(&good, NULL, &run, &m, &failure), VSH_ERROR_LIMIT);
     int asked = 0;

@@ -74,11 +74,11 @@ static void run_all(int s, int32_t threads, outcome *o) {
     const double place[3] = {0.3, 2.1, 0.7};
     const vsh_light lights[2] = {sun(truth_seeds_sun, 0.2), lamp(place, 0.3)};
     const vsh_points points = {COUNT, positions, normals, NULL};
-    vsh_grid *grid = NULL;
-    vsh_field *f = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_field) *f = NULL;
     vsh_result results[2 + SHADOWS + AOS + 3] = {VSH_OK};
     size_t calls = 2;
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     const truth_solid ball = {TRUTH_SPHERE, {0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, 0.9, 0.0};
     vsh_mesh mesh = mesh_of_solid(&ball);
 
@@ -128,9 +128,6 @@ static void run_all(int s, int32_t threads, outcome *o) {
     /* flags that say what has happened may be added where the host's setting is the default one */
     assert_true((after & ~(vshi_floats)VSHI_FLOATS_FLAGS) == (setting & ~(vshi_floats)VSHI_FLOATS_FLAGS));
     o->field = hash(0xcbf29ce484222325u, f->values, (size_t)f->value_count * sizeof *f->values);
-    vsh_triangles_free(triangles);
-    vsh_field_free(f);
-    vsh_grid_free(grid);
     free((void *)(uintptr_t)mesh.positions);
     free((void *)(uintptr_t)mesh.indices);
 }

@@ -4,7 +4,7 @@
 
 /* A half plane's edge: of the angles -a … a around the light those below b are hidden. */
 TEST(an_edge_hides_its_share_of_the_angle) {
-    vsh_outline *wall =
+    OWNED(vsh_outline) *wall =
         box(-1e6, 1.0, 0.0, 2.0); /* seen from y = 0 its edge is the corner farther to the left */
     for (int i = 0; i <= 200; ++i) {
         const double x = -1.0 + 0.01 * i, angle = 0.4;
@@ -21,7 +21,6 @@ TEST(an_edge_hides_its_share_of_the_angle) {
         const double expected = (corner + half) / (2.0 * half);
         assert_true(fabs(vsh_flat_visibility(wall, &light, (const double[]){x, 0.0}) - expected) < 1e-12);
     }
-    vsh_outline_free(wall);
 }
 
 /* Over points all about, with lights in, on and behind the outline. */

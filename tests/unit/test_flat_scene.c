@@ -153,20 +153,6 @@ TEST(errors_tell_their_place) {
     }
     vsh_flat_scene *scene = NULL;
     assert_fails(vsh_flat_scene_read("none.json", NULL, &scene, &failure), VSH_ERROR_READ, "none.json");
-    assert_fails(vsh_flat_scene_read(NULL, NULL, &scene, &failure), VSH_ERROR_ARGUMENT, "NULL");
-    vsh_flat_scene_free(NULL);
-}
-
-/* Cut anywhere, a scene's file is no scene, and no crash. */
-TEST(a_cut_file_is_an_error) {
-    static const char whole[] = WITH("{\"shape\":\"polygon\",\"points\":[[0,0],[1,0],[0,1]]}");
-    for (size_t size = 0; size + 1 < sizeof whole - 1; ++size) {
-        char text[sizeof whole] = "";
-        memcpy(text, whole, size);
-        write_scene(text);
-        vsh_flat_scene *scene = NULL;
-        assert_int_equal(vsh_flat_scene_read(path, NULL, &scene, &failure), VSH_ERROR_INPUT);
-    }
 }
 
 TEST(casters_become_one_outline) {

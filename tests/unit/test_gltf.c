@@ -1,70 +1,9 @@
 /* glTF by the text of its specification: accessors of every kind, extensions, poses and transforms, each
  * where a reader that is off by a little would give something else; and what is refused. */
-#include "models.h"
+#include "gltf_maker.h"
 #include "testing.h"
 
-enum { BYTES = 5120, UBYTES, SHORTS, USHORTS, UINTS = 5125, FLOATS };
-
-/* A file on its way: a buffer, and the lists of its views and accessors. */
-typedef struct maker {
-    unsigned char bytes[4096];
-    size_t size;
-    size_t beyond; /* bytes that the buffer has beyond its byteLength */
-    char views[4096], accessors[4096];
-    int count; /* of each */
-} maker;
-
-/* An accessor of all of a view of its own; returns its number. Views begin 4 bytes into their bytes. */
-static int add(maker *m, const void *data, size_t size, const char *view, int type, int count,
-               const char *kind, const char *more) {
-    const char *comma = m->count > 0 ? "," : "";
-    memset(m->bytes + m->size, 0x55, 4); /* what is read by mistake is no number that is meant */
-    memcpy(m->bytes + m->size + 4, data, size);
-    snprintf(m->views + strlen(m->views), sizeof m->views - strlen(m->views),
-             "%s{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu%s}", comma, m->size, size + 4, view);
-    snprintf(m->accessors + strlen(m->accessors), sizeof m->accessors - strlen(m->accessors),
-             "%s{\"bufferView\":%d,\"byteOffset\":4,\"componentType\":%d,\"count\":%d,\"type\":\"%s\"%s}",
-             comma, m->count, type, count, kind, more);
-    m->size += (size + 4 + 3) / 4 * 4;
-    return m->count++;
-}
-
-static const float QUAD[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-static const float UP[4][3] = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
-
-/* One with the corners of a quad, accessor 0, and its normals, accessor 1. */
-static maker *begin(void) {
-    maker *m = calloc(1, sizeof *m);
-    assert_non_null(m);
-    add(m, QUAD, sizeof QUAD, "", FLOATS, 4, "VEC3", "");
-    add(m, UP, sizeof UP, "", FLOATS, 4, "VEC3", "");
-    return m;
-}
-
-/* The file's text: `rest` is all but buffer, views and accessors. */
-static const char *text_of(const maker *m, const char *rest) {
-    static char json[1 << 17], text[1 << 14];
-    base64(m->bytes, m->size, text);
-    const int size = snprintf(json, sizeof json,
-                              "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":%zu,\"uri\":"
-                              "\"data:application/octet-stream;base64,%s\"}],\"bufferViews\":[%s],"
-                              "\"accessors\":[%s],%s}",
-                              m->size - m->beyond, text, m->views, m->accessors, rest);
-    assert_in_range(size, 1, sizeof json - 1);
-    return json;
-}
-
-#define MESH(attributes, more) "\"meshes\":[{\"primitives\":[{\"attributes\":{" attributes "}" more "}]}]"
-#define NODE(more) "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0" more "}],"
-#define ALONE NODE("")
-
 /* These free the maker. */
-static vsh_model *read_made(maker *m, const char *rest) {
-    vsh_model *model = read_text("a.gltf", text_of(m, rest));
-    free(m);
-    return model;
-}
-
 static void refuse_as(maker *m, const char *rest, vsh_result code, const char *part, const char *other) {
     refused("a.gltf", text_of(m, rest), code, part, other);
     free(m);

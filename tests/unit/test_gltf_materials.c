@@ -2,31 +2,26 @@
  * reader, which is this test. */
 #define _GNU_SOURCE
 
+#include "gltf_maker.h"
 #include "served.h"
 #include "testing.h"
 
-/* Three corners and an "image" of 5 bytes. */
+/* Five bytes are the image, in buffer view 2. */
 static const unsigned char image[5] = {'I', 'M', 'A', 'G', 'E'};
 
-static const char *material_json(const char *materials, const char *rest) {
-    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    static char json[8192], text[128];
-    unsigned char body[41];
-    memcpy(body, corners, 36);
-    memcpy(body + 36, image, 5);
-    base64(body, sizeof body, text);
-    const int size = snprintf(
-        json, sizeof json,
-        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{"
-        "\"primitives\":[{\"attributes\":{\"POSITION\":0},\"material\":1},{\"attributes\":{\"POSITION\":0}},"
-        "{\"attributes\":{\"POSITION\":0},\"material\":0}]}],\"accessors\":[{\"bufferView\":0,"
-        "\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"}],\"bufferViews\":[{\"buffer\":0,"
-        "\"byteLength\":36},"
-        "{\"buffer\":0,\"byteOffset\":36,\"byteLength\":5}],\"materials\":[%s],%s,"
-        "\"buffers\":[{\"byteLength\":41,\"uri\":\"data:;base64,%s\"}]}",
-        materials, rest, text);
-    assert_in_range(size, 1, sizeof json - 1);
-    return json;
+static const char *material_json(const char *materials, const char *more) {
+    char rest[4096];
+    FREED maker *m = begin();
+    memcpy(m->bytes + m->size, image, sizeof image);
+    snprintf(m->views + strlen(m->views), 100, ",{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":5}",
+             m->size);
+    m->size += 8;
+    snprintf(rest, sizeof rest,
+             ALONE "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0},\"material\":1},"
+                   "{\"attributes\":{\"POSITION\":0}},{\"attributes\":{\"POSITION\":0},\"material\":0}]}],"
+                   "\"materials\":[%s],%s",
+             materials, more);
+    return text_of(m, rest);
 }
 
 #define LEAF(more)                                                                                           \
@@ -36,7 +31,7 @@ static const char *material_json(const char *materials, const char *rest) {
     "\"index\":0" more "}}}"
 
 static const char textures[] = "\"textures\":[{\"source\":0,\"sampler\":0}],\"samplers\":[{\"wrapS\":33071,"
-                               "\"wrapT\":33648}],\"images\":[{\"bufferView\":1,\"mimeType\":\"image/png\"}]";
+                               "\"wrapT\":33648}],\"images\":[{\"bufferView\":2,\"mimeType\":\"image/png\"}]";
 
 TEST(masked_materials_come_with_their_image) {
     for (int reader = 0; reader < 2; ++reader) {
@@ -106,36 +101,24 @@ TEST(transforms_map_uvs_with_v_up) {
 
 /* Two triangles of one material, whose UVs are those of accessors. */
 static const char *packed_json(const char *material, int one, int other) {
-    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}},
-                       plain[3][2] = {{0, 0}, {0.5F, 0}, {0, 0.25F}};
-    static const uint16_t integers[3][2] = {{0, 0}, {4096, 0}, {0, 2048}};
-    static char json[4096], text[128];
-    unsigned char body[72];
-    memcpy(body, corners, 36);
-    memcpy(body + 36, integers, 12);
-    memcpy(body + 48, plain, 24);
-    base64(body, sizeof body, text);
-    const int size = snprintf(
-        json, sizeof json,
-        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0}],\"meshes\":[{"
-        "\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":%d},\"material\":0},"
-        "{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":%d},\"material\":0}]}],\"accessors\":["
-        "{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},"
-        "{\"bufferView\":1,\"componentType\":5123,\"count\":3,\"type\":\"VEC2\"},"
-        "{\"bufferView\":1,\"componentType\":5123,\"normalized\":true,\"count\":3,\"type\":\"VEC2\"},"
-        "{\"bufferView\":2,\"componentType\":5126,\"count\":3,\"type\":\"VEC2\"}],"
-        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteOffset\":36,\"byteLength\":12}"
-        ","
-        "{\"buffer\":0,\"byteOffset\":48,\"byteLength\":24}],"
-        "\"materials\":[{\"alphaMode\":\"MASK\",%s}],\"textures\":[{}],"
-        "\"buffers\":[{\"byteLength\":72,\"uri\":\"data:;base64,%s\"}]}",
-        one, other, material, text);
-    assert_in_range(size, 1, sizeof json - 1);
-    return json;
+    static const uint16_t integers[4][2] = {{0, 0}, {4096, 0}, {0, 2048}};
+    static const float plain[4][2] = {{0, 0}, {0.5F, 0}, {0, 0.25F}};
+    char rest[4096];
+    FREED maker *m = begin();
+    add(m, integers, sizeof integers, "", USHORTS, 4, "VEC2", "");
+    add(m, integers, sizeof integers, "", USHORTS, 4, "VEC2", ",\"normalized\":true");
+    add(m, plain, sizeof plain, "", FLOATS, 4, "VEC2", "");
+    snprintf(rest, sizeof rest,
+             ALONE
+             "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":%d},\"material\":"
+             "0},{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":%d},\"material\":0}]}],"
+             "\"materials\":[{\"alphaMode\":\"MASK\",%s}],\"textures\":[{}]",
+             one, other, material);
+    return text_of(m, rest);
 }
 
 TEST(uvs_that_a_packer_made_integers_are_what_textures_see) {
-    enum { INTEGER = 1, NORMALIZED = 2, PLAIN = 3 };
+    enum { INTEGER = 2, NORMALIZED, PLAIN };
     static const struct {
         const char *material;
         int one, other; /* accessors */
@@ -181,7 +164,7 @@ TEST(uvs_that_a_packer_made_integers_are_what_textures_see) {
 
 TEST(images_may_lie_beside_or_in_the_json) {
     for (int reader = 0; reader < 2; ++reader) {
-        vsh_model *model = read_gltf_by(
+        OWNED(vsh_model) *model = read_gltf_by(
             reader != 0,
             material_json(LEAF(""), "\"textures\":[{\"extensions\":{\"EXT_texture_webp\":{\"source\":0}}}],"
                                     "\"images\":[{\"uri\":\"my%20leaf.webp\"}]"));
@@ -189,14 +172,12 @@ TEST(images_may_lie_beside_or_in_the_json) {
         assert_null(leaf.image);
         assert_string_equal(leaf.image_path, path_of("my leaf.webp").text);
         assert_true(leaf.wrap[0] == VSH_WRAP_REPEAT && leaf.wrap[1] == VSH_WRAP_REPEAT);
-        vsh_model_free(model);
-        model = read_gltf_by(reader != 0,
-                             material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
-                                                     "\"data:image/png;base64,SU1BR0U=\"}]"));
-        leaf = vsh_model_get_material(model, 1);
+        OWNED(vsh_model) *within = read_gltf_by(
+            reader != 0, material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
+                                                 "\"data:image/png;base64,SU1BR0U=\"}]"));
+        leaf = vsh_model_get_material(within, 1);
         assert_int_equal(leaf.image_size, sizeof image);
         assert_memory_equal(leaf.image, image, sizeof image);
-        vsh_model_free(model);
     }
 }
 
@@ -211,7 +192,7 @@ TEST(a_mask_that_cannot_be_had_is_left_out_with_a_warning) {
         {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"https://a/b.png\"}]", "only files beside it"},
         {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"/etc/passwd\"}]", "outside of its folder"},
         {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"data:;base64,*\"}]", "no base64"},
-        {"\"textures\":[{\"source\":0,\"sampler\":0}],\"images\":[{\"bufferView\":1}]", "'sampler' is 0"},
+        {"\"textures\":[{\"source\":0,\"sampler\":0}],\"images\":[{\"bufferView\":2}]", "'sampler' is 0"},
     };
     for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
         for (int reader = 0; reader < 2; ++reader) {
@@ -243,7 +224,7 @@ static void look_at_materials(const vsh_model *model) {
 static void write_two_images(void) {
     const char *json =
         material_json(LEAF(""), "\"textures\":[{\"source\":0},{\"source\":1}],\"images\":[{\"uri\":"
-                                "\"x.png\"},{\"bufferView\":1}]");
+                                "\"x.png\"},{\"bufferView\":2}]");
     write_bytes("a.gltf", json, strlen(json));
 }
 

@@ -1,6 +1,6 @@
 /* Buffer views under EXT_meshopt_compression: what meshoptimizer packed comes out again, through filters as
  * near as their bits, and what is damaged is refused. */
-#include "models.h"
+#include "gltf_maker.h"
 #include "testing.h"
 
 #include <meshoptimizer.h>
@@ -163,9 +163,8 @@ TEST(floats_with_an_exponent_come_out_again) {
     meshopt_encodeFilterExp(folded, VERTICES, sizeof folded[0], 24, positions[0]);
     views[0].filter = "EXPONENTIAL";
     views[0].size = meshopt_encodeVertexBuffer(views[0].bytes, PACKED, folded, VERTICES, sizeof folded[0]);
-    vsh_model *model = read_text("a.gltf", packed_json());
+    OWNED(vsh_model) *model = read_text("a.gltf", packed_json());
     assert_memory_equal(vsh_model_mesh(model, 0, 0).positions, positions, sizeof positions); /* of few bits */
-    vsh_model_free(model);
 
     /* the same bits as the library's, of every exponent that gives a finite number */
     for (size_t v = 0; v < VERTICES; ++v) {
@@ -175,23 +174,20 @@ TEST(floats_with_an_exponent_come_out_again) {
         }
     }
     views[0].size = meshopt_encodeVertexBuffer(views[0].bytes, PACKED, folded, VERTICES, sizeof folded[0]);
-    model = read_text("a.gltf", packed_json());
-    const float *made = vsh_model_mesh(model, 0, 0).positions;
+    OWNED(vsh_model) *other = read_text("a.gltf", packed_json());
+    const float *made = vsh_model_mesh(other, 0, 0).positions;
     for (size_t v = 0; v < VERTICES; ++v) {
         for (size_t c = 0; c < 3; ++c) {
             const int exponent = (int8_t)(folded[v][c] >> 24), mantissa = (int32_t)(folded[v][c] << 8) >> 8;
             assert_true(made[3 * v + c] == (float)ldexp(mantissa, exponent));
         }
     }
-    vsh_model_free(model);
 }
 
 /* The meshes of instances, each turned. */
 TEST(quaternions_come_out_again) {
     static float given[VERTICES][4];
     static int16_t folded[VERTICES][4];
-    static char json[1 << 15], text[1 << 14];
-    static unsigned char packed[1 << 13];
     enum { COUNT = 64 };
     for (size_t v = 0; v < COUNT; ++v) {
         direction(9 * v, given[v]);
@@ -202,22 +198,20 @@ TEST(quaternions_come_out_again) {
         given[v][3] = (float)cos(half);
     }
     meshopt_encodeFilterQuat(folded, COUNT, 8, 16, given[0]);
-    static const float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-    const size_t size = meshopt_encodeVertexBuffer(packed + 36, sizeof packed - 36, folded, COUNT, 8);
-    memcpy(packed, corners, 36);
-    base64(packed, 36 + size, text);
-    snprintf(
-        json, sizeof json,
-        "{\"asset\":{\"version\":\"2.0\"},\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0,\"extensions\":"
-        "{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"ROTATION\":1}}}}],\"meshes\":[{\"primitives\":[{"
-        "\"attributes\":{\"POSITION\":0}}]}],\"buffers\":[{\"byteLength\":%zu,\"uri\":\"data:;base64,%s\"}],"
-        "\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":3,\"type\":\"VEC3\"},{"
-        "\"bufferView\":1,\"componentType\":5122,\"normalized\":true,\"count\":%d,\"type\":\"VEC4\"}],"
-        "\"bufferViews\":[{\"buffer\":0,\"byteLength\":36},{\"buffer\":0,\"byteLength\":%d,\"extensions\":{"
-        "\"EXT_meshopt_compression\":{\"buffer\":0,\"byteOffset\":36,\"byteLength\":%zu,\"byteStride\":8,"
-        "\"count\":%d,\"mode\":\"ATTRIBUTES\",\"filter\":\"QUATERNION\"}}}]}",
-        36 + size, text, COUNT, 8 * COUNT, size, COUNT);
-    OWNED(vsh_model) *model = read_text("a.gltf", json);
+    maker *made = begin();
+    const size_t size = meshopt_encodeVertexBuffer(made->bytes + made->size, sizeof made->bytes - made->size,
+                                                   folded, COUNT, 8);
+    snprintf(made->views + strlen(made->views), 400,
+             ",{\"buffer\":0,\"byteLength\":%d,\"extensions\":{\"EXT_meshopt_compression\":{\"buffer\":0,"
+             "\"byteOffset\":%zu,\"byteLength\":%zu,\"byteStride\":8,\"count\":%d,\"mode\":\"ATTRIBUTES\","
+             "\"filter\":\"QUATERNION\"}}}",
+             8 * COUNT, made->size, size, COUNT);
+    strcat(made->accessors, ",{\"bufferView\":2,\"componentType\":5122,\"normalized\":true,\"count\":64,"
+                            "\"type\":\"VEC4\"}");
+    made->size += size;
+    OWNED(vsh_model) *model = read_made(
+        made, NODE(",\"extensions\":{\"EXT_mesh_gpu_instancing\":{\"attributes\":{\"ROTATION\":2}}}")
+                  MESH("\"POSITION\":0", ""));
     assert_int_equal(vsh_model_mesh_count(model), COUNT);
     for (size_t i = 0; i < COUNT; ++i) {
         const double x = (double)given[i][0], y = (double)given[i][1], z = (double)given[i][2];

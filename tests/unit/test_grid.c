@@ -4,25 +4,7 @@
 
 #include <sys/resource.h>
 
-TEST(a_sphere_is_exact_in_its_band) {
-    sphere s = {{0, 0, 0}, 1.0, 0};
-    const vsh_distance field = sphere_field(&s);
-    const vsh_grid_options options = with_voxel(0.02);
-    OWNED(vsh_grid) *grid = NULL;
-    assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
-    assert_less(worst_error(grid, unit_sphere, 2.999, 2.999), 1e-5);
-    assert_int_equal(wrong_blocks(grid, unit_sphere, 10), 0);
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    assert_float_equal(info.voxel_size, 0.02, 1e-12);
-    assert_float_equal(info.half_width, 3.0, 1e-6);
-    for (int i = 0; i < 3; ++i) {
-        assert_true(info.bounds_min[i] > -1.05 && info.bounds_min[i] < -1.0 + 1e-9);
-        assert_true(info.bounds_max[i] < 1.05 && info.bounds_max[i] > 1.0 - 1e-9);
-    }
-}
-
-TEST(a_dense_copy_has_every_distance) {
+TEST(a_sphere_is_exact_and_a_dense_copy_has_every_distance) {
     sphere s = {{0.3, 0, 0}, 1.0, 0};
     const vsh_distance field = sphere_field(&s);
     const vsh_grid_options options = with_voxel(0.05);
@@ -30,8 +12,13 @@ TEST(a_dense_copy_has_every_distance) {
     assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
+    assert_float_equal(info.voxel_size, 0.05, 1e-12);
+    assert_float_equal(info.half_width, 3.0, 1e-6);
     int32_t size[3], low[3];
     for (int i = 0; i < 3; ++i) {
+        const double centre = i == 0 ? 0.3 : 0.0;
+        assert_true(info.bounds_min[i] > centre - 1.1 && info.bounds_min[i] < centre - 1.0 + 1e-9);
+        assert_true(info.bounds_max[i] < centre + 1.1 && info.bounds_max[i] > centre + 1.0 - 1e-9);
         low[i] = info.index_min[i] - 1;
         size[i] = info.index_max[i] - low[i] + 2;
         assert_in_range(size[i], 2.0 / 0.05 + 4, 2.0 / 0.05 + 9);
@@ -51,7 +38,7 @@ TEST(a_dense_copy_has_every_distance) {
                     p[row] = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
                 }
                 const double truth = sqrt((p[0] - 0.3) * (p[0] - 0.3) + p[1] * p[1] + p[2] * p[2]) - 1.0;
-                assert_float_equal(values[at], fmax(-band, fmin(band, truth)), 1e-6);
+                assert_float_equal(values[at], fmax(-band, fmin(band, truth)), 5e-7);
                 const int edge =
                     x == 0 || y == 0 || z == 0 || x == size[0] - 1 || y == size[1] - 1 || z == size[2] - 1;
                 assert_true(!edge || values[at] == band);
@@ -79,24 +66,6 @@ TEST(the_work_follows_the_area) {
     const double voxels = 4.0 * 3.14159265 / (0.01 * 0.01);
     assert_less((double)calls[1], 20.0 * voxels);          /* layers of voxels, of which the band has 6 */
     assert_less((double)calls[1], 4.4 * (double)calls[0]); /* 4: area, 8: volume */
-}
-
-TEST(far_from_the_origin_nothing_changes) {
-    const vsh_grid_options options = with_voxel(0.03125);
-    vsh_grid *grids[2];
-    vsh_grid_info infos[2];
-    for (int i = 0; i < 2; ++i) {
-        sphere s = {{0, 0, 0}, 1.0, 0};
-        s.centre[0] = i * 1e7;
-        s.centre[2] = i * -3e6;
-        const vsh_distance field = sphere_field(&s);
-        assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grids[i], &failure));
-        vsh_grid_get_info(grids[i], &infos[i]);
-    }
-    assert_same_leaves(grids[0], grids[1], 1e-7f);
-    assert_float_equal(infos[1].transform[3] - infos[0].transform[3], 1e7, 0.0);
-    vsh_grid_free(grids[0]);
-    vsh_grid_free(grids[1]);
 }
 
 TEST(a_room_inside_a_solid_stays_a_room) {
@@ -357,23 +326,13 @@ TEST(rooms_stay_open_in_a_union_of_different_lattices) {
 }
 
 TEST(threads_do_not_show_in_unions) {
-    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05);
+    OWNED(vsh_grid) *ball = ball_grid(0.0, 1.0, 0.05), *one = NULL, *five = NULL;
     const double turned[12] = {0.6, -0.8, 0, 0.5, 0.8, 0.6, 0, 0, 0, 0, 1, 0.1};
     const vsh_grid_instance instances[2] = {{ball, NULL}, {ball, turned}};
-    vsh_grid *first = NULL;
-    const int32_t threads[3] = {1, 2, 5};
-    for (int i = 0; i < 3; ++i) {
-        const vsh_run run = run_on(threads[i]);
-        vsh_grid *both = NULL;
-        assert_ok(vsh_grid_unite(instances, 2, NULL, &run, &both, &failure));
-        if (first != NULL) {
-            assert_same_leaves(first, both, 0.0f);
-            vsh_grid_free(both);
-        } else {
-            first = both;
-        }
-    }
-    vsh_grid_free(first);
+    const vsh_run alone = run_on(1), many = run_on(5);
+    assert_ok(vsh_grid_unite(instances, 2, NULL, &alone, &one, &failure));
+    assert_ok(vsh_grid_unite(instances, 2, NULL, &many, &five, &failure));
+    assert_same_leaves(one, five, 0.0f);
 }
 
 TEST(bad_unions_are_refused_with_the_reason) {

@@ -201,24 +201,6 @@ TEST(arenas_of_the_host_change_nothing) {
     }
 }
 
-template <typename Work> void expect_same_on_threads(const Outcome &expected, size_t count, Work &&work_of) {
-    std::vector<Outcome> all(count);
-    std::vector<std::thread> threads;
-    for (size_t i = 0; i < count; ++i) {
-        threads.emplace_back([&, i] { all[i] = work_of(i); });
-    }
-    for (std::thread &thread : threads) {
-        thread.join();
-    }
-    for (const Outcome &o : all) {
-        expect_same(expected, o, "a thread");
-    }
-}
-
-TEST(many_threads_with_fields_of_their_own_get_the_same_bits) {
-    expect_same_on_threads(plain(), 8, [](size_t i) { return work(int32_t(i % 3)); });
-}
-
 // One field, one query handle, one grid: shared by threads that shade, sample and bake volumes at once.
 TEST(many_threads_share_one_field) {
     vsh_sdf_node node = vsh_sdf_node_default();
@@ -247,22 +229,25 @@ TEST(many_threads_share_one_field) {
     };
     const Outcome expected = bake(1);
     assert_true(expected.failure.empty());
-    expect_same_on_threads(expected, 12, [&](size_t i) { return bake(int32_t(i % 4)); });
+    std::vector<Outcome> all(12);
+    std::vector<std::thread> threads;
+    for (size_t i = 0; i < all.size(); ++i) {
+        threads.emplace_back([&, i] { all[i] = bake(int32_t(i % 4)); });
+    }
+    for (std::thread &thread : threads) {
+        thread.join();
+    }
+    for (const Outcome &o : all) {
+        expect_same(expected, o, "a thread");
+    }
 }
 
 TEST(embree_of_the_host_is_not_called) {
-    const float positions[9] = {0, 0, 0, 1, 0, 0, 0, 0, 1};
-    const uint32_t indices[3] = {0, 1, 2};
-    vsh_mesh mesh{};
-    mesh.positions = positions;
-    mesh.indices = indices;
-    mesh.vertex_count = 3;
-    mesh.triangle_count = 1;
+    const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
+    float corners[24];
+    const vsh_mesh mesh = box_mesh(corners, low, high);
     OWNED(vsh_triangles) *triangles = nullptr;
-    vsh_error error{};
-    const vsh_result result = vsh_triangles_create(&mesh, 1, nullptr, &triangles, &error);
-    assert_string_equal(error.message, "");
-    assert_int_equal(result, VSH_OK);
+    assert_ok(vsh_triangles_create(&mesh, 1, nullptr, &triangles, &failure));
     assert_false(host_called);
 }
 

