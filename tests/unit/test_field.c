@@ -243,6 +243,48 @@ TEST(signs_hold_deep_inside_big_solids_and_far_outside) {
     }
 }
 
+TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
+    /* a box turned by 50° about (1, 2, 3), far from the origin; voxels of 0.04 at 1000 units */
+    const double half = 25.0 / 180.0 * 3.14159265358979323846, norm = sqrt(14.0);
+    const double turn[4] = {sin(half) / norm, 2.0 * sin(half) / norm, 3.0 * sin(half) / norm, cos(half)};
+    vsh_sdf_node node = vsh_sdf_node_default();
+    node.shape = VSH_SDF_BOX;
+    memcpy(node.size, (const double[3]){0.8, 0.5, 0.3}, sizeof node.size);
+    memcpy(node.rotation, turn, sizeof node.rotation);
+    memcpy(node.translation, (const double[3]){1000.0, -500.0, 0.123}, sizeof node.translation);
+    const vsh_sdf sdf = {&node, 1};
+    const vsh_grid_options options = with_voxel(VOXEL);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    OWNED(vsh_field) *field = field_of_grid(grid, 2.0);
+
+    const truth_solid box = {TRUTH_BOX, {0.0, 0.0, 0.0}, {0.8, 0.5, 0.3}, 0.0, 0.0};
+    uint64_t counter = 5;
+    double squares = 0.0;
+    const int count = 200000;
+    for (int i = 0; i < count; ++i) {
+        double local[3], p[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            local[axis] = between(&counter, -1.5, 1.5);
+        }
+        /* Rodrigues' rotation about the unit axis a by 50° */
+        const double a[3] = {1.0 / norm, 2.0 / norm, 3.0 / norm};
+        const double c = cos(2.0 * half), s = sin(2.0 * half);
+        const double along = a[0] * local[0] + a[1] * local[1] + a[2] * local[2];
+        for (int axis = 0; axis < 3; ++axis) {
+            const int j = (axis + 1) % 3, k = (axis + 2) % 3;
+            p[axis] = c * local[axis] + s * (a[j] * local[k] - a[k] * local[j]) +
+                      (1.0 - c) * along * a[axis] + node.translation[axis];
+        }
+        const double h = resolved_distance(field, p);
+        const double truth = truth_solid_distance(&box, local);
+        const double error = (h - truth) / resolving_voxel(field, h);
+        assert_at_most(fabs(error), 0.87);
+        squares += error * error;
+    }
+    assert_less(sqrt(squares / count), 0.1);
+}
+
 TEST(positions_that_are_not_finite_give_nan_and_far_ones_do_not) {
     OWNED(vsh_field) *field = seeds_field(1.0);
     for (int axis = 0; axis < 3; ++axis) {

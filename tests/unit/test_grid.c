@@ -68,6 +68,24 @@ TEST(the_work_follows_the_area) {
     assert_less((double)calls[1], 4.4 * (double)calls[0]); /* 4: area, 8: volume */
 }
 
+TEST(far_from_the_origin_nothing_changes) {
+    const vsh_grid_options options = with_voxel(0.03125);
+    vsh_grid *grids[2];
+    vsh_grid_info infos[2];
+    for (int i = 0; i < 2; ++i) {
+        sphere s = {{0, 0, 0}, 1.0, 0};
+        s.centre[0] = i * 1e7;
+        s.centre[2] = i * -3e6;
+        const vsh_distance field = sphere_field(&s);
+        assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grids[i], &failure));
+        vsh_grid_get_info(grids[i], &infos[i]);
+    }
+    assert_same_leaves(grids[0], grids[1], 1e-7f);
+    assert_float_equal(infos[1].transform[3] - infos[0].transform[3], 1e7, 0.0);
+    vsh_grid_free(grids[0]);
+    vsh_grid_free(grids[1]);
+}
+
 TEST(a_room_inside_a_solid_stays_a_room) {
     const vsh_sdf sdf = hollow_sphere();
     const vsh_grid_options options = with_voxel(0.03);
