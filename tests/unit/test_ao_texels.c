@@ -1,5 +1,4 @@
-/* AO of a lightmap's texels by rays that they share, against rays that each shoots alone. Without Embree
- * there is nothing to test. */
+/* Compares AO by rays that a lightmap's texels share with AO by rays that each texel shoots alone. */
 #include "testing.h"
 #include "texels_of.h"
 #include "traced.h"
@@ -80,7 +79,6 @@ typedef struct how {
     int32_t spacing;
     double max_error;
     int32_t padding;
-    int32_t threads;
     size_t receivers; /* of the first so many; 0: all */
     bool marched;     /* by VSH_AO_ADAPTIVE */
 } how;
@@ -100,21 +98,11 @@ static baked *bake(const stage *s, how h) {
         create(s->receivers, h.receivers == 0 ? RECEIVERS : h.receivers, options, NULL);
     const vsh_lightmap lightmap = {
         .ao = b->ao, .ao_error = b->error, .bent = b->bent, .coverage = b->coverage};
-    const vsh_run run = run_on(h.threads);
     vsh_bake_stats stats = vsh_bake_stats_zero();
-    assert_ok(vsh_bake_lightmap(occluders_of_caster(&s->casters), charts, NULL, 0, &options.shade, &run,
+    assert_ok(vsh_bake_lightmap(occluders_of_caster(&s->casters), charts, NULL, 0, &options.shade, NULL,
                                 &lightmap, &stats, &failure));
     b->stats = stats.shade;
     return b;
-}
-
-TEST(threads_change_no_bit) {
-    FREED baked *one = bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = 1});
-    for (int32_t threads = 2; threads <= 8; ++threads) {
-        FREED baked *more =
-            bake(*state, (how){.spacing = 4, .max_error = 0.02, .padding = 2, .threads = threads});
-        assert_memory_equal(one, more, sizeof *one);
-    }
 }
 
 /* Root mean squares over covered texels; of bent normals weighted by AO, for in the dark they point anywhere.
@@ -164,11 +152,6 @@ TEST(errors_are_below_those_asked_for_with_few_rays) {
         FREED baked *shared = bake(*state, (how){.spacing = 4, .max_error = errors[e]}),
                     *alone = bake(*state, (how){.spacing = 1, .max_error = errors[e]});
         const judged j = judge(shared, truth), a = judge(alone, truth);
-        print_message("asked %g: RMSE %.5f, said %.5f (%.2f), most %.3f, bias %+.5f, bent %.2f°, %.0f rays\n",
-                      errors[e], j.is, j.said, j.is / j.said, j.most, j.bias, j.angle,
-                      (double)shared->stats.rays);
-        print_message("    alone: RMSE %.5f, said %.5f, most %.3f, bias %+.5f, bent %.2f°, %.0f rays\n", a.is,
-                      a.said, a.most, a.bias, a.angle, (double)alone->stats.rays);
         assert_true(j.is < most[e] && j.is < 0.8 * before && j.is < a.is);
         assert_true(j.is > 0.8 * j.said && j.is < 2.3 * j.said && j.said < 0.5 * errors[e]);
         assert_true(fabs(j.bias) < 0.003 && j.most < 0.3);
@@ -176,7 +159,6 @@ TEST(errors_are_below_those_asked_for_with_few_rays) {
         assert_true(j.angle < angles[e] && j.angle < 1.25 * a.angle);
         /* the statistics also count how windows bend, and stay near the measured error */
         const double noise = j.said * j.said * (double)j.count, all = shared->stats.ao_square_error;
-        print_message("    with what bends: said %.5f\n", sqrt(all / (double)j.count));
         assert_true(all > 0.999 * noise && all < 2.0 * j.is * j.is * (double)j.count);
         assert_true(j.is < 1.1 * sqrt(all / (double)j.count));
         before = j.is;
@@ -219,8 +201,8 @@ TEST(a_lone_ball_sees_along_its_normals) {
     stage s = *(stage *)*state;
     s.receivers[0] = s.ball.mesh;
     s.casters = caster_of((truth_scene){ball, 1}, 0.02, 4.0);
-    baked *shared = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1}),
-          *alone = bake(&s, (how){.spacing = 1, .max_error = 0.02, .receivers = 1});
+    FREED baked *shared = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1}),
+                *alone = bake(&s, (how){.spacing = 1, .max_error = 0.02, .receivers = 1});
     const judged j = judge(shared, alone);
     double least = 1.0;
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -233,10 +215,7 @@ TEST(a_lone_ball_sees_along_its_normals) {
             least = fmin(least, dot);
         }
     }
-    print_message("%zu texels: least cosine %.6f\n", j.count, least);
     assert_true(j.count > 500 && least > cos(RADIANS(0.1)));
-    free(alone);
-    free(shared);
     caster_free(&s.casters);
 }
 
@@ -252,7 +231,7 @@ TEST(an_open_plate_is_exactly_1_and_has_no_seams) {
     s.receivers[0].positions = s.floor.positions;
     s.receivers[0].uvs = s.floor.uvs;
     s.casters = caster_of((truth_scene){&plate, 1}, 0.04, 4.0);
-    baked *b = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1});
+    FREED baked *b = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1});
     float least = 1.0f, most = 0.0f;
     for (size_t i = 0; i < TEXELS; ++i) {
         const size_t x = i % WIDTH, y = i / WIDTH;
@@ -264,11 +243,8 @@ TEST(an_open_plate_is_exactly_1_and_has_no_seams) {
             most = fmaxf(most, b->error[i]);
         }
     }
-    print_message("errors %.5f … %.5f, %.1f rays a texel\n", (double)least, (double)most,
-                  (double)b->stats.rays / TEXELS);
     assert_true(least == most);
     assert_true(b->stats.rays <= 8 * TEXELS);
-    free(b);
     caster_free(&s.casters);
 }
 
@@ -285,8 +261,6 @@ TEST(fine_texels_take_few_rays) {
                 *truth = bake(&s, (how){.spacing = 1, .max_error = 0.005, .receivers = 1});
     const judged j = judge(few, truth);
     const double rays = (double)few->stats.rays / (double)j.count;
-    print_message("RMSE %.5f, said %.5f, most %.3f, bias %+.5f, bent %.2f°, %.2f rays a texel\n", j.is,
-                  sqrt(few->stats.ao_square_error / (double)j.count), j.most, j.bias, j.angle, rays);
     assert_true(rays < 6.0);
     assert_true(j.is < 0.02 && j.most < 0.15 && fabs(j.bias) < 0.004 && j.angle < 3.0);
     assert_true(j.is < 1.1 * sqrt(few->stats.ao_square_error / (double)j.count));
@@ -330,8 +304,6 @@ TEST(what_ends_beside_a_square_darkens_no_texel_of_the_next_row) {
             worst = fmaxf(worst, exact[i] - ao[i]);
             dark += exact[i] < 0.05f;
         }
-        print_message("board over %d rows: darker by %.3f at worst, %zu texels dark\n", rows, (double)worst,
-                      dark);
         assert_true(dark > 10 * SIDE && dark < SIDE * SIDE * 2 / 3);
         assert_true(worst < 0.25f);
     }

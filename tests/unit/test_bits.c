@@ -254,12 +254,11 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     options.shade.ao_distance = 0.75;
     float *planes[1] = {shadow_plane};
     vsh_lightmap map = {.shadow = planes, .ao = ao_plane, .irradiance = rgb, .coverage = coverage};
-    vsh_charts *made = NULL;
+    OWNED(vsh_charts) *made = NULL;
     const vsh_light light = sun();
     assert_ok(vsh_charts_create(&floor, 1, &options, &c->run, NULL, &made, &failure));
     assert_ok(vsh_bake_lightmap(occluders_of(c->field), made, &light, 1, &options.shade, &c->run, &map, NULL,
                                 &failure));
-    vsh_charts_free(made);
     add_floats(b, shadow_plane, TEXELS);
     add_floats(b, ao_plane, TEXELS);
     add_floats(b, rgb, 3 * TEXELS);
@@ -286,10 +285,9 @@ static void seams(const context *c, int32_t unused, bits *b) {
         open[i / 3] = light[i];
     }
     const vsh_lightmap map = {.ao = open, .irradiance = light};
-    vsh_charts *charts = NULL;
+    OWNED(vsh_charts) *charts = NULL;
     assert_ok(vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, &failure));
     assert_ok(vsh_lightmap_stitch(charts, &map, 0, NULL, run, NULL, &failure));
-    vsh_charts_free(charts);
     add_floats(b, open, STITCHED_TEXELS);
     add_floats(b, light, 3 * STITCHED_TEXELS);
 }
@@ -479,11 +477,11 @@ enum { OF_AO = 1, CUT_OUT = 2 };
 /* Rays are Embree's. */
 static void exact(const context *c, int32_t what, bits *b) {
     vsh_alpha_mask mask;
-    float *uvs = NULL;
+    FREED float *uvs = NULL;
     const vsh_heights_source source = hills();
     OWNED(vsh_model) *model = NULL;
     OWNED(vsh_grid) *grid = NULL;
-    vsh_triangles *triangles = NULL;
+    OWNED(vsh_triangles) *triangles = NULL;
     context here = {.run = c->run};
     assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &failure));
     vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -501,8 +499,6 @@ static void exact(const context *c, int32_t what, bits *b) {
     here.triangles = triangles;
     const vsh_light light = sun();
     shade(&here, (what & OF_AO) != 0 ? NULL : &light, &shading, b);
-    free(uvs);
-    vsh_triangles_free(triangles);
     vsh_field_free(here.field);
 }
 

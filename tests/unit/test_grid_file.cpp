@@ -372,7 +372,6 @@ std::vector<float> shadows_of(const vsh_grid *grid) {
     return visible;
 }
 
-// Bands of other widths too: narrower ones than 3 voxels are made anew.
 // Distances in all voxels of a box, as arrays become grids: beyond the background, too.
 TEST(dense_distances_are_no_damage) {
     const FloatGrid::Ptr grid = FloatGrid::create(float(3.0 * VOXEL));
@@ -401,10 +400,10 @@ TEST(dense_distances_are_no_damage) {
     vsh_grid_free(read);
 }
 
+// Also bands of other widths: those narrower than 3 voxels are made anew.
 TEST(scaled_values_and_narrow_bands_cast_the_same_shadows) {
-    vsh_grid *own = own_sphere();
+    OWNED(vsh_grid) *own = own_sphere();
     const std::vector<float> expected = shadows_of(own);
-    vsh_grid_free(own);
     const struct {
         float factor, half_width;
         size_t warnings;
