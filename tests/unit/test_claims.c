@@ -434,6 +434,28 @@ TEST(ends_of_penumbrae_do_not_collapse) {
     assert_true(o.rays < 200.0);
 }
 
+/* The forms themselves, by rays. */
+TEST(closed_forms_are_what_many_rays_see) {
+    const double at[][2] = {{0.1, 0.05},  {-0.2, 0.1}, {0.03, -0.11},
+                            {-0.3, -0.2}, {0.2, -0.3}, {-0.05, 0.31}};
+    for (int k = 0; k < 2 * SHAPES; ++k) {
+        FREED_BY(free_stage) stage *s = make_stage(k / 2, k % 2, 0.25);
+        for (size_t i = 0; i < sizeof at / sizeof at[0]; ++i) {
+            const double x = s->ao && s->shape != DISC ? -fabs(at[i][0]) : at[i][0];
+            const double z = s->ao && s->shape != DISC ? -fabs(at[i][1]) : at[i][1];
+            const double p[3] = {x, 0.0, z};
+            const float up[3] = {0.0f, 1.0f, 0.0f};
+            const vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
+            float seen = -1.0f;
+            assert_ok(s->ao ? vsh_trace_ao(s->triangles, NULL, 1, p, up, 0.0,
+                                           s->shape == DISC ? 100.0 : DISTANCE, 65536, NULL, &seen, NULL)
+                            : vsh_trace_shadow(s->triangles, NULL, 1, p, up, 0.0, &light, 65536, NULL, &seen,
+                                               NULL));
+            assert_true(fabs((double)seen - truth_at(s, x, z)) < 5e-4);
+        }
+    }
+}
+
 int main(void) {
     const char *all = getenv("VSH_CLAIMS");
     everything = all != NULL && strcmp(all, "1") == 0;
