@@ -18,15 +18,10 @@ static const char *last_part(const char *path) {
     return slash != NULL ? slash + 1 : path;
 }
 
-/* The folder of the path, in new memory: "." where the path names none. */
-static char *folder_of(const char *path) {
-    const size_t length = (size_t)(last_part(path) - path);
-    char *folder = malloc(length + 2);
-    if (folder != NULL) {
-        memcpy(folder, length > 0 ? path : ".", length > 0 ? length : 1);
-        folder[length > 1 ? length - 1 : 1] = '\0';
-    }
-    return folder;
+/* Finds the folder of the path, or "." if the path names none. The system opens no path over PATH_MAX. */
+static void find_folder(const char *path, char folder[PATH_MAX]) {
+    const int length = (int)(last_part(path) - path);
+    snprintf(folder, PATH_MAX, "%.*s", length > 1 ? length - 1 : 1, length > 0 ? path : ".");
 }
 
 const char *vshi_path_ending(const char *path) {
@@ -140,9 +135,9 @@ static bool is_left(int file, long process) {
  * Files of other users, and those that cannot be opened, stay. */
 static void clean_temporaries(const char *target) {
     const naming n = naming_of(target);
-    char *folder = folder_of(target);
-    DIR *listing = folder != NULL ? opendir(folder) : NULL;
-    free(folder);
+    char folder[PATH_MAX];
+    find_folder(target, folder);
+    DIR *listing = opendir(folder);
     if (listing == NULL) {
         return;
     }
@@ -223,20 +218,14 @@ vsh_result vshi_output_check(const char *path, vsh_error *error) {
     if (last_part(path)[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is a folder", path);
     }
-    char *folder = folder_of(path);
-    if (folder == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    }
+    char folder[PATH_MAX];
+    find_folder(path, folder);
     struct stat status;
-    vsh_result result;
     if (stat(folder, &status) != 0 || access(folder, W_OK | X_OK) != 0) {
-        result =
-            vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: its folder: %s", path, strerror(errno));
-    } else {
-        result = check_target(path, error);
+        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: its folder: %s", path,
+                         strerror(errno));
     }
-    free(folder);
-    return result;
+    return check_target(path, error);
 }
 
 vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error) {
@@ -276,12 +265,9 @@ vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *e
  * only the file's contents. What fails of the latter leaves the file in its place as it is: file systems
  * there are that cannot, and folders that may not be read. */
 static vsh_result put_in_place(const char *temporary, const char *target, vsh_error *error) {
-    char *path = folder_of(target);
-    if (path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", target);
-    }
+    char path[PATH_MAX];
+    find_folder(target, path);
     const int folder = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    free(path);
     const vsh_result result =
         rename(temporary, target) == 0
             ? VSH_OK
@@ -479,8 +465,7 @@ bool vshi_input_is_beside(const char *model, const char *path) {
             return true;
         }
     }
-    char *given = folder_of(model);
-    const bool beside = given != NULL && realpath(given, folder) != NULL && lies_in(folder, file);
-    free(given);
-    return beside;
+    char given[PATH_MAX];
+    find_folder(model, given);
+    return realpath(given, folder) != NULL && lies_in(folder, file);
 }

@@ -49,7 +49,7 @@ typedef double truth_fn(const double position[3]);
 /* Largest error, in voxels, over voxels whose true distance lies in -inside … outside voxels; and the signs
  * of all others that leaves hold. */
 static inline double worst_error(const vsh_grid *grid, truth_fn *truth, double inside, double outside) {
-    leaves all = leaves_of(grid);
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
     const double background = all.info.half_width * all.info.voxel_size;
     double worst = 0.0;
     size_t compared = 0;
