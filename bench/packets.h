@@ -23,10 +23,10 @@ const char *truth_packing_name(int packing);
 typedef struct truth_question {
     size_t count;
     const double *origins; /* [count][3] */
-    const float *normals;  /* [count][3], unit; of a light NULL: no horizon */
-    const double *towards; /* [3], of a light; NULL: AO */
-    double w;              /* of a light: radius at unit distance */
-    double distance;       /* of AO */
+    const float *normals;  /* [count][3], unit; NULL: shadows without a horizon */
+    const double *towards; /* [3], towards the light; NULL: AO */
+    double w;              /* the light's radius at unit distance */
+    double distance;       /* AO distance */
     size_t rays;
 } truth_question;
 

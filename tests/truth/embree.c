@@ -124,8 +124,8 @@ typedef struct work {
     const truth_mesh *truth;
     const double *origins;
     const float *normals;
-    const double *towards; /* of a light; NULL: the hemisphere */
-    double w;              /* of a light: radius at unit distance */
+    const double *towards; /* towards the light; NULL: AO */
+    double w;              /* the light's radius at unit distance */
     float distance;
     size_t rays;
     bool (*counts)(const truth_mesh *truth, struct RTCRay ray); /* whether a ray adds to the share */

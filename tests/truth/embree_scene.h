@@ -1,4 +1,4 @@
-/* What embree.c and the benchmarks share. */
+/* An Embree scene of triangles for embree.c and the benchmarks. */
 #ifndef TRUTH_EMBREE_SCENE_H
 #define TRUTH_EMBREE_SCENE_H
 

@@ -20,7 +20,7 @@ typedef struct maker {
 static inline int add(maker *m, const void *data, size_t size, const char *view, int type, int count,
                       const char *kind, const char *more) {
     const char *comma = m->count > 0 ? "," : "";
-    memset(m->bytes + m->size, 0x55, 4); /* what is read by mistake is no number that is meant */
+    memset(m->bytes + m->size, 0x55, 4); /* a read before the data finds no plausible number */
     memcpy(m->bytes + m->size + 4, data, size);
     snprintf(m->views + strlen(m->views), sizeof m->views - strlen(m->views),
              "%s{\"buffer\":0,\"byteOffset\":%zu,\"byteLength\":%zu%s}", comma, m->size, size + 4, view);

@@ -58,8 +58,8 @@ typedef struct stage {
     vsh_field *field;
 } stage;
 
-/* The floor of the seeds' scene, a voxel and more from what stands there, where the field says what it knows.
- * None of this scene took part in the fit of the cones' table. */
+/* The floor of the seeds' scene, at least a voxel from the casters. The cones' table was not fitted to this
+ * scene. */
 static const stage *seeds(void) {
     static stage s;
     if (s.field == NULL) {
@@ -347,7 +347,8 @@ TEST(edges_hide_as_much_as_their_casters) {
 
 /* --- rays until an error is reached */
 
-/* Rays of a call, whose error is at most what it says, and that at most what was asked for. */
+/* Shades until the error asked for is reached. Checks that the true error is at most the estimate, and the
+ * estimate at most the error asked for. */
 static vsh_shade_stats shade_until(const vsh_occluders *casters, const places *p, const float *truth,
                                    const vsh_shade_options *options) {
     static float ao[TEXELS], deviation[TEXELS];

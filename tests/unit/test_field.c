@@ -387,7 +387,7 @@ TEST(the_memory_limit_covers_every_level) {
     vsh_run run = vsh_run_default();
     vsh_grid_info from;
     vsh_grid_get_info(grid, &from);
-    run.memory_limit = from.bytes + info.bytes - 1; /* what is given and what comes of it would pass it */
+    run.memory_limit = from.bytes + info.bytes - 1; /* a byte less than grid and field need */
     assert_int_equal(vsh_field_create(grid, NULL, &run, &field, &failure), VSH_ERROR_LIMIT);
     assert_null(field);
     assert_int_equal(failure.code, VSH_ERROR_LIMIT);

@@ -116,7 +116,7 @@ TEST(boxes_that_cross_in_one_mesh_or_two_are_their_union) {
     }
 }
 
-/* --- what is in what */
+/* --- meshes inside others */
 
 static double dome_and_cube(const double p[3]) {
     const double d = ball(p, 3.0);

@@ -70,7 +70,7 @@ TEST(a_point_at_the_light_gets_no_infinity) {
     }
 }
 
-/* Of a spot whose axis leans by so much from the way down to the point. */
+/* The red irradiance below a spot whose axis leans by `degrees` from the direction to the point. */
 static float red_leaning(vsh_light light, double degrees) {
     light.axis[0] = 3.0 * sin(RADIANS(degrees));
     light.axis[1] = -3.0 * cos(RADIANS(degrees));

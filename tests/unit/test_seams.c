@@ -30,7 +30,7 @@ static charts_mesh *two_strips(int pieces, double left, double right) {
     return m;
 }
 
-/* What lies left of both strips' gap is 0.5, and what lies right of it 0.53. */
+/* Values are 0.5 left of the gap between the strips and 0.53 right of it. */
 static float *plane_of_columns(void) {
     float *plane = new_plane(0.5f);
     for (size_t t = 0; t < TEXELS; ++t) {
