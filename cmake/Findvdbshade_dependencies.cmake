@@ -27,7 +27,7 @@ vsh_find(draco draco/compression/decode.h draco)
 vsh_find(meshoptimizer meshoptimizer.h meshoptimizer)
 vsh_find(jansson jansson.h jansson)
 vsh_find(seccomp seccomp.h seccomp)
-vsh_find(md sha256.h md)
+vsh_find(nettle nettle/sha2.h nettle)
 vsh_find(sleef sleef.h sleef)
 vsh_find(half Imath/half.h Imath-3_1)
 
@@ -40,7 +40,7 @@ find_package(embree 3 CONFIG REQUIRED)
 find_package_handle_standard_args(vdbshade_dependencies REQUIRED_VARS VSH_openvdb_LIBRARY VSH_openimageio_LIBRARY
                                   VSH_openimageio_util_LIBRARY VSH_png_LIBRARY
                                   VSH_assimp_LIBRARY VSH_draco_LIBRARY VSH_meshoptimizer_LIBRARY VSH_jansson_LIBRARY VSH_seccomp_LIBRARY VSH_half_LIBRARY
-                                  VSH_md_LIBRARY VSH_sleef_LIBRARY VSH_three_FOLDER)
+                                  VSH_nettle_LIBRARY VSH_sleef_LIBRARY VSH_three_FOLDER)
 
 if(NOT TARGET vsh::openexr)
   set_property(TARGET vsh::openvdb PROPERTY INTERFACE_LINK_LIBRARIES TBB::tbb vsh::half)
@@ -49,7 +49,7 @@ if(NOT TARGET vsh::openexr)
   target_link_libraries(vsh::openexr INTERFACE OpenEXR::OpenEXRCore)
   add_library(vsh::dependencies INTERFACE IMPORTED)
   target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::meshoptimizer vsh::jansson
-                                                    vsh::md vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
+                                                    vsh::nettle vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
   # Its headers, and the name that src/trace/embree_load.c loads it by.
   get_target_property(config embree IMPORTED_CONFIGURATIONS)

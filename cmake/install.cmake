@@ -35,7 +35,7 @@ option(VSH_STATIC "Build the static library too" ON)
 if(VSH_STATIC AND NOT VSH_SANITIZE)
   add_library(vdbshade_static STATIC $<TARGET_OBJECTS:vdbshade_objects> $<TARGET_OBJECTS:vdbshade_openvdb_objects>
               $<TARGET_OBJECTS:vdbshade_importers_objects>)
-  foreach(found openvdb half png assimp draco meshoptimizer jansson md sleef seccomp)
+  foreach(found openvdb half png assimp draco meshoptimizer jansson nettle sleef seccomp)
     cmake_path(GET VSH_${found}_LIBRARY FILENAME file)
     string(REGEX REPLACE "^lib(.*)\\.(so|a|dylib)$" "\\1" file ${file})
     list(APPEND VSH_STATIC_NEEDS ${file})

@@ -1,20 +1,20 @@
-/* SHA-256 of files, by libmd. */
+/* SHA-256 of files, by Nettle. */
 #include "base/digest.h"
 
 #include "base/file.h"
 
-#include <sha256.h>
+#include <nettle/sha2.h>
 #include <stdio.h>
 
-_Static_assert(VSH_DIGEST_TEXT == SHA256_DIGEST_STRING_LENGTH, "a digest's text");
+_Static_assert(VSH_DIGEST_TEXT == 2 * SHA256_DIGEST_SIZE + 1, "a digest's text");
 
 static vsh_result digest_stream(FILE *file, const char *path, char *digest, vshi_job *job, vsh_error *error) {
-    SHA2_CTX context;
-    SHA256Init(&context);
+    struct sha256_ctx context;
+    sha256_init(&context);
     unsigned char bytes[1 << 14];
     size_t count;
     while ((count = fread(bytes, 1, sizeof bytes, file)) > 0) {
-        SHA256Update(&context, bytes, count);
+        sha256_update(&context, count, bytes);
         if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
         }
@@ -22,7 +22,11 @@ static vsh_result digest_stream(FILE *file, const char *path, char *digest, vshi
     if (ferror(file)) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path);
     }
-    SHA256End(&context, digest);
+    uint8_t sum[SHA256_DIGEST_SIZE];
+    sha256_digest(&context, sizeof sum, sum);
+    for (size_t i = 0; i < sizeof sum; ++i) {
+        snprintf(digest + 2 * i, 3, "%02x", sum[i]);
+    }
     return VSH_OK;
 }
 

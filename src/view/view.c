@@ -8,7 +8,7 @@
 #include "base/utf8.h"
 #include "view/page.h"
 
-#include <sha256.h>
+#include <nettle/sha2.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -158,11 +158,11 @@ vsh_result vshi_view_advance(const vshi_view *view, vshi_job *job, size_t units,
 
 /* The source by which Content-Security-Policy (W3C, level 2) knows a script or style: 'sha256-…'. */
 static void put_source(vshi_page *page, const vshi_embedded *embedded) {
-    uint8_t digest[SHA256_DIGEST_LENGTH];
-    SHA2_CTX context;
-    SHA256Init(&context);
-    SHA256Update(&context, embedded->bytes, embedded->size);
-    SHA256Final(digest, &context);
+    uint8_t digest[SHA256_DIGEST_SIZE];
+    struct sha256_ctx context;
+    sha256_init(&context);
+    sha256_update(&context, embedded->size, embedded->bytes);
+    sha256_digest(&context, sizeof digest, digest);
     vshi_page_text(page, " 'sha256-");
     for (size_t i = 0; i < sizeof digest; i += VSHI_BASE64_BYTES) {
         char letters[VSHI_BASE64_LETTERS];
