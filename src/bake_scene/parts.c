@@ -386,6 +386,13 @@ static vsh_result finish_part(part_output *part, vsh_error *error) {
                                         part->output.target, strerror(part->error));
 }
 
+/* The part that bakes a tile, from 0 on. On pages from 2048 texels on, tiles go out in runs: neighbours
+ * share pages of memory, so parts of single tiles would each touch all of every plane. */
+static uint64_t find_owner(const vsh_charts *charts, uint64_t tile, uint64_t parts) {
+    const uint64_t run = (uint64_t)charts->info.width / 1024;
+    return tile / (run > 1 ? run : 1) % parts;
+}
+
 /* The tiles of a lightmap that are the shard's; *number is of the first tile that has texels, and moves on to
  * the next lightmap's. */
 static vsh_result list_tiles(const vshi_scene_bake *bake, const vsh_charts *charts, uint64_t *number,
@@ -394,8 +401,9 @@ static vsh_result list_tiles(const vshi_scene_bake *bake, const vsh_charts *char
     *count = 0;
     VSHI_TRY(vshi_allocate((void **)tiles, all, sizeof **tiles, "part", error));
     for (size_t tile = 0; tile < all; ++tile) {
-        const uint64_t shards = (uint64_t)bake->options.shard_count;
-        if (charts->samples[tile] > 0 && (*number)++ % shards == (uint64_t)bake->options.shard - 1) {
+        if (charts->samples[tile] > 0 &&
+            find_owner(charts, (*number)++, (uint64_t)bake->options.shard_count) + 1 ==
+                (uint64_t)bake->options.shard) {
             (*tiles)[(*count)++] = (uint32_t)tile;
         }
     }
@@ -892,7 +900,7 @@ static vsh_result take_all(vshi_parts *parts, vshi_scene_page *page, uint32_t *o
     const size_t tiles = vshi_charts_tiles(&page->charts->sorted);
     for (size_t tile = 0; tile < tiles; ++tile) {
         if (page->charts->samples[tile] > 0) {
-            owner[tile] = (uint32_t)(parts->number++ % parts->count) + 1;
+            owner[tile] = (uint32_t)find_owner(page->charts, parts->number++, parts->count) + 1;
         }
     }
     for (size_t i = 0; i < parts->count; ++i) {

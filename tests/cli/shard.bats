@@ -99,7 +99,7 @@ load parts
 }
 
 @test "a lightmap that memory has no room for is merged to the same bits" {
-    options=("${CLOISTER[@]}" --size 128x2048 --irradiance --bent-normals tangent --sky y --error)
+    options=("${CLOISTER[@]}" --size 2048x128 --irradiance --bent-normals tangent --sky y --error)
     one out.exr "${options[@]}"
     parts out.exr 3 "" "${options[@]}"
     succeed merge out.exr --memory-limit 16M
