@@ -2,7 +2,7 @@
 # when it is built (`vdbshade help --write FOLDER`).
 set(VSH_HELP_PAGES ${PROJECT_BINARY_DIR}/help_pages.c)
 file(GLOB VSH_HELP_TEXTS CONFIGURE_DEPENDS docs/*.md)
-list(FILTER VSH_HELP_TEXTS EXCLUDE REGEX "/architecture.md$") # which is for who changes it
+list(FILTER VSH_HELP_TEXTS EXCLUDE REGEX "/(architecture|README).md$") # for developers; an index of links
 string(REPLACE ";" "," pages "${VSH_HELP_TEXTS}")
 add_custom_command(OUTPUT ${VSH_HELP_PAGES}
                    COMMAND ${CMAKE_COMMAND} -DOUT=${VSH_HELP_PAGES} "-DPAGES=${pages}" -P ${PROJECT_SOURCE_DIR}/cmake/embed_docs.cmake
