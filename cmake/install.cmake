@@ -21,7 +21,7 @@ set_target_properties(vdbshade_cli_installed PROPERTIES
                       INSTALL_RPATH "${VSH_LIBRARY_RPATH}" BUILD_WITH_INSTALL_RPATH ON LINKER_LANGUAGE C)
 install(TARGETS vdbshade_cli_installed RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT program)
 install(TARGETS vdbshade_reader RUNTIME DESTINATION ${VSH_READER_DIR} COMPONENT library)
-install(FILES LICENSE docs/licences.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
+install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
 install(DIRECTORY src/bindings/blender/vdbshade_bake DESTINATION ${CMAKE_INSTALL_DATADIR}/vdbshade/blender COMPONENT program
         FILES_MATCHING PATTERN "*.py")
 install(DIRECTORY include/vdbshade DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development FILES_MATCHING PATTERN "*.h")

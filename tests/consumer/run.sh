@@ -20,7 +20,7 @@ library=$(dirname "$(find "$prefix" -name libvdbshade.so)")
 "$prefix/bin/vdbshade" --version
 "$here/../runpath.sh" "$prefix"
 cmp "$here/../../LICENSE" "$prefix/share/doc/vdbshade/LICENSE"
-grep -q 'License, version 2.0' "$prefix/share/doc/vdbshade/licences.md"
+grep -q 'License, version 2.0' "$prefix/share/doc/vdbshade/docs/install.md"
 
 say "files are read by the reader beside it, or not at all"
 printf 'v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n' >"$work/a.obj"
