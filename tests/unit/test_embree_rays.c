@@ -61,7 +61,7 @@ TEST(a_half_plane_hides_what_its_closed_form_says) {
             const double error = (double)p.values[i] - truth_disc_share(p.origins[3 * i] / tan(0.1));
             square += error * error / POINTS;
         }
-        /* at most n^-3/4 / 2, at a half (README, method `rays`) */
+        /* at most n^-3/4 / 2, at a half (bench/README.md, method `rays`) */
         assert_true(sqrt(square) < 0.5 * pow(rays, -0.75));
     }
 }
