@@ -163,8 +163,8 @@ static double worst_across_edge(double thick, double depth, double w, double vox
 
 TEST(a_straight_edge_casts_the_penumbra_of_a_disc) {
     /* A depth h shows h behind the edge, so x becomes x / (1 + w x) in the umbra's half. That is 0.011 for
-     * the wider light. The lattice rounds the edge, which is the rest. README has the bounds for lights of
-     * degrees. */
+     * the wider light. The lattice rounds the edge, which is the rest. `lights` has the bounds for lights
+     * of degrees. */
     const double ws[] = {0.02, 0.05}, depths[] = {1.0, 2.0, 5.0, 10.0, 30.0};
     for (int i = 0; i < 10; ++i) {
         if (ws[i / 5] * depths[i % 5] <= 1.0) { /* the cone is no wider than the slab is thick */
