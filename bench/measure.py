@@ -390,7 +390,7 @@ def cancel():
             yield [name, title, *row]
 
 
-# --- seams: how far values on both sides of charts' borders differ if the surface is smooth, as bilinear lookups give them (docs/seams.md):
+# --- seams: how far values on both sides of charts' borders differ if the surface is smooth, as bilinear lookups give them (docs/unwrap.md):
 # Lightmaps are of many rays, as baked, and stitched; "off" is the error of the lookups against rays from these very places.
 
 def edges_of(mesh):
