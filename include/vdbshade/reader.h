@@ -30,8 +30,7 @@
  *
  * Not promised: that the reader cannot read other files of a model's folder, or learn of any path whether it
  * is there, or that what a file shows is right. Scene files, lists of spheres and points are parsed in this
- * process always, by code of ours and Jansson. docs/reliability.md has what it costs and what was tried,
- * docs/SECURITY.md what is held against whom, and by what. */
+ * process always, by code of ours and Jansson. docs/security.md has the threats, the limits and the gaps. */
 #ifndef VDBSHADE_READER_H
 #define VDBSHADE_READER_H
 

@@ -347,7 +347,7 @@ VSH_API int32_t vsh_scene_marches(const vsh_scene *scene, const vsh_scene_layer 
 enum { VSH_RESOLUTION_NAMED = -1 };
 
 /* Voxels along the longest side of the casters in `layer`, or (NULL) in none, where `points` of receivers are
- * to be shaded by the scene's methods (docs/auto.md tells how they are chosen). VSH_RESOLUTION_NAMED: those
+ * to be shaded by the scene's methods (docs/accuracy.md: how they are chosen). VSH_RESOLUTION_NAMED: those
  * that the scene or the layer names; 0: none, rays against triangles are faster alone. It depends on what
  * the scene holds, and on nothing else. `assets` are those loaded for this scene. Cannot fail. */
 VSH_API int32_t vsh_scene_resolution(const vsh_scene *scene, const vsh_assets *assets,

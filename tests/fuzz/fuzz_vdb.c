@@ -1,5 +1,5 @@
 /* .vdb files: read as a level set, listed, or read as a set of voxels, by the last byte.
- * OpenVDB 10.0 itself is not safe on damaged files: see docs/reliability.md. */
+ * OpenVDB 10.0 itself is not safe on damaged files: see docs/security.md. */
 #include "fuzz.h"
 
 #include <vdbshade/grid.h>

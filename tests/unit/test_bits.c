@@ -1,6 +1,6 @@
 /* The same bits: hashes of what every part computes, checked in. They hold for any number of threads,
  * instruction set, compiler (gcc, clang) and level of optimisation; `tools/bits` tries those. What depends on
- * libraries is apart: a mesh's level set on OpenVDB, what is traced on Embree (docs/reliability.md). A change
+ * libraries is apart: a mesh's level set on OpenVDB, what is traced on Embree (docs/security.md). A change
  * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
  * the base set. */
 #include "base/hash.h"

@@ -1,6 +1,6 @@
 /* Trees that are bounds outside of their edges and corners (intersections, subtractions), or inside (unions):
  * what they become is compared with the distances to the same solids in closed form, near convex and concave
- * corners, wherever they lie on the lattice. docs/numerics.md has the bounds. */
+ * corners, wherever they lie on the lattice. docs/accuracy.md has the bounds. */
 #include "fields.h"
 #include "testing.h"
 

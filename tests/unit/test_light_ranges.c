@@ -1,5 +1,5 @@
 /* The ends of what a light can be: angles of suns, radii and distances of lamps, lamps in casters, on their
- * surfaces and at receivers, light that grazes. Of every method; docs/numerics.md has the bounds,
+ * surfaces and at receivers, light that grazes. Of every method; docs/accuracy.md has the bounds,
  * test_light.c what is refused. */
 #include "field/field.h"
 #include "methods.h"

@@ -1,5 +1,5 @@
 /* The ends of every range that a scene has: voxels, places, bands, AO distances, steps. What a value is there
- * is either a closed form, or what it is in the middle of the range, or refused by name. docs/numerics.md has
+ * is either a closed form, or what it is in the middle of the range, or refused by name. docs/accuracy.md has
  * the bounds; test_light_ranges.c has lights, test_receivers.c points and normals, test_field_run.c reaches.
  */
 #include "methods.h"

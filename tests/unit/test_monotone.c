@@ -1,5 +1,5 @@
 /* What may only go one way: finer voxels and more rays are not farther from the truth, more of a caster hides
- * no less (but for noise), and a lamp that goes away becomes a sun. Of every method; docs/numerics.md has the
+ * no less (but for noise), and a lamp that goes away becomes a sun. Of every method; docs/accuracy.md has the
  * bounds. test_shadow.c has balls that grow and lights of size 0. */
 #include "methods.h"
 #include "testing.h"

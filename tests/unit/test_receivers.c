@@ -1,5 +1,5 @@
 /* Where receivers can be and what normals they can have: deep inside, far outside, on lattice planes; of any
- * length, zero, not finite. Of every method; docs/numerics.md has the bounds. */
+ * length, zero, not finite. Of every method; docs/accuracy.md has the bounds. */
 #include "methods.h"
 #include "testing.h"
 

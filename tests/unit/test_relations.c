@@ -1,5 +1,5 @@
 /* What must hold between two bakes where no truth is needed: scaled, moved, turned and mirrored scenes, of
- * every method. docs/numerics.md has the bounds. test_monotone.c has more of the voxels, of the rays and of
+ * every method. docs/accuracy.md has the bounds. test_monotone.c has more of the voxels, of the rays and of
  * the casters; test_bits.c and test_field_run.c: threads do not show. */
 #include "methods.h"
 #include "testing.h"

@@ -1,4 +1,4 @@
-/* Solids that touch, lie in each other or share faces, and values that are no distances. docs/numerics.md has
+/* Solids that touch, lie in each other or share faces, and values that are no distances. docs/accuracy.md has
  * the bounds; test_csg.c has bounds that become distances. */
 #include "testing.h"
 #include "traced.h"

@@ -1,6 +1,6 @@
 /* What a lattice holds badly or not at all: walls, gaps and needles of a voxel or less, and seams of boxes
  * that touch. On the field by one ray and by rays and cones of a narrow light; on the triangles however thin.
- * docs/numerics.md has the bounds; test_shells.c has meshes in each other. */
+ * docs/accuracy.md has the bounds; test_shells.c has meshes in each other. */
 #include "testing.h"
 #include "traced.h"
 

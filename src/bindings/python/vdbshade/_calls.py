@@ -36,7 +36,7 @@ class Run:
     isa : str
         instruction set of the marching kernels: "best", "base", "avx2", "avx512"
     reader : bool or str
-        True: files are parsed in the library's confined reader (docs/SECURITY.md); a path: by that program;
+        True: files are parsed in the library's confined reader (docs/security.md); a path: by that program;
         False: in this process, where a damaged file can crash it
     reader_seconds : float
         that the reader may take for one file; 0: 60, and one more for each MB
