@@ -1,7 +1,7 @@
 /* Compares baked values with golden ones: measures, their limits, and files of limits.
  *
  * A plain RMSE hardly notices lost penumbrae. So there is one measure for each way in which bakes go wrong:
- * wider penumbrae, shifted values, shadows without their casters. docs/regression.md has the formulas, their
+ * wider penumbrae, shifted values, shadows without their casters. docs/pipeline.md has the formulas, their
  * sources, and what each measure cannot see. */
 #ifndef VDBSHADE_COMPARE_H
 #define VDBSHADE_COMPARE_H
@@ -144,7 +144,7 @@ typedef struct vsh_limits {
 VSH_API vsh_limits vsh_limits_default(void);
 
 /* Widens limits, and sets options.noise, for bakes made by sampling: standard errors a and b make noise of
- * √(a² + b²), in units of the range, 0 … 1. docs/regression.md has the formulas. Set strict limits after
+ * √(a² + b²), in units of the range, 0 … 1. docs/pipeline.md has the formulas. Set strict limits after
  * this call. Cannot fail. */
 VSH_API void vsh_limits_allow_noise(vsh_limits *limits, double noise);
 
@@ -152,7 +152,7 @@ VSH_API void vsh_limits_allow_noise(vsh_limits *limits, double noise);
  * compared, all fail. */
 VSH_API uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limits);
 
-/* Limits from a JSON file (docs/regression.md): for all channels, and for single ones. */
+/* Limits from a JSON file (docs/pipeline.md): for all channels, and for single ones. */
 typedef struct vsh_tolerances vsh_tolerances;
 
 /* Reads such a file. Free it with vsh_tolerances_free(). Errors: VSH_ERROR_ARGUMENT (path or tolerances

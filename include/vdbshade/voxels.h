@@ -114,7 +114,7 @@ VSH_API vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, 
 
 /* Writes all grids as one .vdb file, `half` (nonzero) as 16-bit floats, with attributes [attribute_count] as
  * metadata of every grid (may be NULL where that is 0); the same volume gives the same bytes. Metadata tell
- * method, light and voxel size, too (docs/volume.md). Atomic, as vsh_grid_write(). Errors: VSH_ERROR_ARGUMENT
+ * method, light and voxel size, too (docs/query.md). Atomic, as vsh_grid_write(). Errors: VSH_ERROR_ARGUMENT
  * (path NULL or empty, attributes other than vsh_attribute says), VSH_ERROR_LIMIT (as vsh_grid_write()),
  * VSH_ERROR_WRITE, VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t half,

@@ -366,14 +366,14 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     ! grep -q 'undefined\|texture 0\|image 0' <(grep -o 'id="problems".*' page.dom | head -c 400)
 }
 
-@test "docs/engines.md: the lines for three.js show a lit glTF as it is meant" {
+@test "docs/lit.md: the lines for three.js show a lit glTF as it is meant" {
     three=/usr/share/javascript/three
     write_squares
     sed -i 's/"baseColorFactor"/"metallicFactor": 0, "baseColorFactor"/' squares.gltf
     # the page cannot ask for files: they stand in it
     sed -i "s|light%20map.png|data:image/png;base64,$(base64 -w0 'light map.png')|; s|ao.png|data:image/png;base64,$(base64 -w0 ao.png)|;
         s|squares.bin|data:application/octet-stream;base64,$(base64 -w0 squares.bin)|" squares.gltf
-    awk '/^```js$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "${DOCS:-$BATS_TEST_DIRNAME/../../docs}/engines.md" |
+    awk '/^```js$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "${DOCS:-$BATS_TEST_DIRNAME/../../docs}/lit.md" |
         sed "s|'lit.glb'|'data:application/json;base64,$(base64 -w0 squares.gltf)'|" >lines.js
     grep -q 'addLightmaps(THREE, gltf)' lines.js
     {

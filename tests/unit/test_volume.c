@@ -266,8 +266,8 @@ TEST(layers_hide_light_and_are_solid) {
 enum { SIDE = 64, TEXELS = SIDE * SIDE };
 
 /* The seeds' floor is at y = 0, a plane of the lattice: a receiver there whose texels' centres are its
- * voxels' centres. The stated bound, docs/volume.md: 0.01 where the floor is the nearest surface by two
- * voxels, and an RMSE of 0.01 over all of it. */
+ * voxels' centres. The bound in docs/query.md: 0.0001 where the floor is the nearest surface by two
+ * voxels, and an RMSE of 0.002 over all of it. */
 TEST(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet) {
     const double voxel = 0.0625, half = 0.5 * SIDE * voxel;
     vsh_grid *grid = grid_of(truth_seeds(), voxel);

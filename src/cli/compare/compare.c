@@ -28,7 +28,7 @@ const cli_command cli_compare = {
     "Compares two images channel by channel, or two .vdb files grid by grid, over the texels that both\n"
     "cover: values, widths of penumbrae, displacement, lost shadows. Prints one line a channel. Ends with\n"
     "0 if they are alike, and with 1 if not, or if size, channels, voxels or format differ. For the\n"
-    "measures see docs/regression.md. Numbers in brackets are defaults.",
+    "measures see docs/pipeline.md. Numbers in brackets are defaults.",
     options,
     sizeof options / sizeof options[0],
     compare_main};

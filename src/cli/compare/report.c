@@ -369,11 +369,10 @@ static void write_page(FILE *out, const cli_comparison *comparisons, size_t coun
             write_channel(out, channel, k < c->picture_count ? c->pictures[k] : NULL);
         }
     }
-    fprintf(
-        out,
-        "<p>Grey-blue texels are not compared. docs/regression.md explains the measures. Made by vdbshade "
-        "%s.</p>\n</html>\n",
-        vsh_version());
+    fprintf(out,
+            "<p>Grey-blue texels are not compared. docs/pipeline.md explains the measures. Made by vdbshade "
+            "%s.</p>\n</html>\n",
+            vsh_version());
 }
 
 int cli_comparison_report(const cli_compare_settings *s, const cli_comparison *comparisons, size_t count) {

@@ -84,7 +84,8 @@ const cli_command cli_merge = {
     "OUT [options]",
     "Puts together what 'bake --shard I/N -o OUT' left in OUT.1-of-N.part to OUT.N-of-N.part: the same\n"
     "file, bit by bit, as without --shard. The parts say by which options; their inputs are read again,\n"
-    "from this folder where paths are relative, and must not have changed. Parts stay. See docs/farm.md.",
+    "from this folder where paths are relative, and must not have changed. Parts stay. See\n"
+    "docs/pipeline.md.",
     options,
     sizeof options / sizeof options[0],
     merge_main};

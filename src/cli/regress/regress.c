@@ -39,7 +39,7 @@ const cli_command cli_regress = {
     "Bakes the scenes of a folder whose inputs, options or golden bakes changed, and compares them with\n"
     "DIR/golden as 'vdbshade compare' does. Scenes are DIR/*.json. DIR/regress.json names cases with\n"
     "commands and options of their own. Ends with 0 if all are alike, and with 1 if one is not, or has no\n"
-    "golden bake. See docs/regression.md. Numbers in brackets are defaults.",
+    "golden bake. See docs/pipeline.md. Numbers in brackets are defaults.",
     options,
     sizeof options / sizeof options[0],
     regress_main};

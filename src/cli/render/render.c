@@ -787,7 +787,7 @@ const cli_command cli_render = {
     "INPUT -o OUT [options]",
     "Draws a picture of INPUT, a mesh file, a level set (FILE.vdb, FILE.vdb:GRID) or a scene (.json),\n"
     "with the shadows and AO that bake would give: for looking at a scene or a lightmap. No materials but\n"
-    "a caster's color; docs/render.md says more. Numbers in brackets are the defaults.",
+    "a caster's color; docs/view.md says more. Numbers in brackets are the defaults.",
     options,
     sizeof options / sizeof options[0],
     render_main};

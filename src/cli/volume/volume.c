@@ -294,7 +294,7 @@ const cli_command cli_volume = {
     "INPUT -o OUT.vdb [options]",
     "Bakes soft shadows and ambient occlusion into sparse grids. INPUT is a mesh file, a level set\n"
     "(FILE.vdb, FILE.vdb:GRID) or a scene file (.json; its casters, lights and ao, not its receivers).\n"
-    "docs/volume.md describes the output. Numbers in brackets are the defaults.",
+    "docs/query.md describes the output. Numbers in brackets are the defaults.",
     options,
     sizeof options / sizeof options[0],
     volume_main};

@@ -1,6 +1,6 @@
 """Bakes shadows and ambient occlusion of the selected objects by vdbshade, and puts the image into their materials.
 
-An add-on for Blender 3.4 and later (docs/blender.md). Its panel is in the sidebar of
+An add-on for Blender 3.4 and later (docs/lit.md). Its panel is in the sidebar of
 the 3D view, tab "vdbshade". The program does the work in a process of its own: Blender can be used meanwhile, and Esc
 ends the bake. Objects that are hidden from renders cast nothing."""
 

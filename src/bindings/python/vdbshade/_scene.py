@@ -815,7 +815,7 @@ def compare_judge(measures: Measures, limits: Optional[Limits] = None) -> List[s
 
 
 class Tolerances(Handle, kind="vsh_tolerances"):
-    """Limits from a JSON file (docs/regression.md)."""
+    """Limits from a JSON file (docs/pipeline.md)."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(call(lib.vsh_tolerances_read, path_of(path, "path"), OUT))
