@@ -73,7 +73,8 @@ typedef struct trade_work {
     vsh_solids *solids;       /* of the procedural casters; NULL without any */
     double triangles_s;
     vsh_occluders *fields[MOST_RESOLUTIONS]; /* with triangles if all casters have some; finest first */
-    uint8_t *mask;                           /* [texels]: 1 where a texel is valid in all fields */
+    vsh_occluders *voxels[MOST_RESOLUTIONS]; /* the same fields without triangles, for methods that march */
+    uint8_t *mask;                           /* [texels]: 1 where a texel is valid in all of these */
     size_t points;                           /* texels of the mask */
     double *positions;                       /* [points][3] */
     float *normals;                          /* [points][3] */
@@ -283,24 +284,35 @@ static int bake(const trade_work *work, const trade_subject *subject, const vsh_
     return cli_check_result(result, &error);
 }
 
-/* Makes the casters at a resolution, and drops the texels that are not valid with them from the mask. */
-static int make_field(trade_work *work, int32_t resolution, vsh_occluders **field) {
-    vsh_scene scene = *work->scene;
-    scene.grid.resolution = resolution;
-    scene.grid.voxel_size = 0.0;
-    scene.shade.method = VSH_SHADOW_AUTO; /* which keeps triangles where it can */
-    scene.shade.ao_method = VSH_AO_AUTO;
-    CLI_TRY(make_occluders(work, &scene, true, field));
-    CLI_TRY(bake(work, NULL, *field, &work->scene->shade, work->values));
+/* Drops the texels that are not valid with these casters from the mask. */
+static int drop_invalid(trade_work *work, const vsh_occluders *occluders) {
+    CLI_TRY(bake(work, NULL, occluders, &work->scene->shade, work->values));
     for (size_t i = 0; i < work->texels; ++i) {
         work->mask[i] &= work->values[i] > 0.0f;
     }
     return CLI_OK;
 }
 
+/* Makes the casters at a resolution, with triangles and without. */
+static int make_field(trade_work *work, int32_t resolution, vsh_occluders **field, vsh_occluders **voxels) {
+    vsh_scene scene = *work->scene;
+    scene.grid.resolution = resolution;
+    scene.grid.voxel_size = 0.0;
+    scene.shade.method = VSH_SHADOW_AUTO; /* which keeps triangles where it can */
+    scene.shade.ao_method = VSH_AO_AUTO;
+    CLI_TRY(make_occluders(work, &scene, true, field));
+    vsh_occluder_parts parts;
+    vsh_occluders_get_parts(*field, &parts);
+    parts.triangles = NULL;
+    vsh_error error;
+    CLI_TRY(cli_check_result(vsh_occluders_from_parts(&parts, voxels, &error), &error));
+    CLI_TRY(drop_invalid(work, *field));
+    return drop_invalid(work, *voxels);
+}
+
 static int make_fields(trade_work *work) {
     for (size_t i = 0; i < work->settings->resolution_count; ++i) {
-        CLI_TRY(make_field(work, work->settings->resolutions[i], &work->fields[i]));
+        CLI_TRY(make_field(work, work->settings->resolutions[i], &work->fields[i], &work->voxels[i]));
     }
     for (size_t i = 0; i < work->texels; ++i) {
         work->points += work->mask[i];
@@ -558,8 +570,9 @@ static int measure_plan(trade_work *work, trade_subject *subject, const trade_pl
         const size_t used = strlen(run.options);
         snprintf(run.options + used, sizeof run.options - used, " --resolution %d", run.resolution);
         scene.shade.early_rays = 0;
+        const vsh_occluders *occluders = exact ? work->fields[f] : work->voxels[f];
         add_costs(work->fields[f], exact, &run);
-        CLI_TRY(measure_run(work, subject, work->fields[f], &scene.shade, &run));
+        CLI_TRY(measure_run(work, subject, occluders, &scene.shade, &run));
     }
     return CLI_OK;
 }
@@ -921,6 +934,7 @@ static void free_work(trade_work *work) {
         free(work->subjects[s].truth);
     }
     for (size_t i = 0; i < MOST_RESOLUTIONS; ++i) {
+        vsh_occluders_free(work->voxels[i]);
         vsh_occluders_free(work->fields[i]);
     }
     for (size_t i = 0; i < work->receiver_count; ++i) {
