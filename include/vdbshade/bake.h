@@ -23,10 +23,8 @@ typedef struct vsh_lightmap_options {
                               * VSH_PADDING_AUTO: by 16, and all that is farther takes the mean of what a mip
                               * level holds around it, so that no level reads background */
     vsh_shade_options shade; /* of a bake that is given none; checked there */
-    int32_t ao_spacing; /* 1, 2, 4 or 8 texels: AO by cones or adaptive is shaded no closer than this where
-                         * casters are far enough, and interpolated between. Over 1 texels share the rays
-                         * of exact AO. 1: each texel has its own, as those of supersampled lightmaps have
-                         * always */
+    int32_t ao_spacing; /* 1, 2, 4 or 8 texels. Above 1, texels share the rays of AO by exact and adaptive,
+                         * and those between may send none. 1, and with supersampling: each has its own */
     int32_t tangents;   /* nonzero: keep what bent normals in tangent space need, 16 bytes a sample */
 } vsh_lightmap_options;
 
@@ -85,9 +83,9 @@ VSH_API void vsh_charts_free(vsh_charts *charts); /* NULL does nothing */
 typedef struct vsh_charts_info {
     int32_t width; /* texels */
     int32_t height;
-    uint64_t covered; /* texels with at least one sample */
-    uint64_t samples; /* evaluated positions, supersampling counted */
-    uint64_t bytes;   /* in memory */
+    uint64_t covered;                    /* texels with at least one sample */
+    uint64_t samples;                    /* evaluated positions, supersampling counted */
+    uint64_t bytes;                      /* in memory */
     double bounds_min[3], bounds_max[3]; /* world box of the meshes' vertices, for vsh_scene_reach() */
 } vsh_charts_info;
 

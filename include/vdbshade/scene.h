@@ -63,7 +63,7 @@ typedef struct vsh_caster {
     const char *text;         /* text: what is written, UTF-8 */
     vsh_text_options letters; /* text */
     double thickness;         /* mask, text: along z, local units, > 0 */
-    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.7, a light grey */
+    double color[3];          /* in pictures, linear RGB, 0 … 1; all 0: 0.6, a light grey */
     vsh_selection objects;    /* mesh: which of its meshes cast */
     const vsh_solidity_rule *solidity; /* [solidity_count]; mesh: of those that cast; later ones overrule */
     size_t solidity_count;

@@ -194,8 +194,7 @@ static const vshi_key receiver_keys[] = {
                          .otherwise = "fix for .glb and .gltf, keep for images")),
     VSHI_KEY("ao_spacing", INTEGER, AT(ao_spacing), .lowest = 1.0, .highest = 8.0,
              VSHI_OPTION("ao-spacing", "N", FILE_ONLY,
-                         "texels: AO by cones or adaptive is interpolated between texels so far apart where "
-                         "casters are far; texels share the rays of exact AO; 1: neither",
+                         "texels: above 1, texels share the rays of AO by exact and adaptive",
                          .range = "1, 2, 4 or 8")),
     VSHI_KEY("output", PATH, AT(output), .required = VSHI_ALL),
     VSHI_KEY("bits", CUSTOM, AT(bits), .read = vshi_read_bits,
@@ -424,11 +423,12 @@ static const vshi_key scene_keys[] = {
                          "also tint.NAME.R, .G, .B of each light, its penumbra coloured: (V, V²/2 + V/2, V²) "
                          "or powers of V such as 1,1.2,1.5; irradiance takes it too",
                          .range = "quadratic, or R,G,B: powers from 0.0625 to 16", .otherwise = "none")),
-    VSHI_KEY("method", NAME, AT(shade.method), .names = VSH_NAMES_SHADOW,
-             VSHI_OPTION("method", "NAME", OCCLUSION,
-                         "of the shadow; auto: exact where all casters are triangles, else adaptive; all but "
-                         "these and rays are previews, which keep no error; classic, practical and improved "
-                         "have the outer half of the penumbra only")),
+    VSHI_KEY(
+        "method", NAME, AT(shade.method), .names = VSH_NAMES_SHADOW,
+        VSHI_OPTION("method", "NAME", OCCLUSION,
+                    "of the shadow; auto: exact, or adaptive if the casters are only a .vdb file, or only "
+                    "masks and text; methods other than these and rays are previews and promise no "
+                    "error; classic, practical and improved have only the outer half of the penumbra")),
     VSHI_KEY("rays", INTEGER, AT(shade.rays), .lowest = 1.0, .highest = 4096.0,
              VSHI_OPTION("rays", "N", ACCURACY, "rays a texel; with adaptive and exact a limit",
                          .otherwise = "64, or as many as the error takes")),
