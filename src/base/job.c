@@ -121,7 +121,8 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
     return vshi_isa_check(full->isa, error);
 }
 
-static void send_line(const vsh_run *run, const char *prefix, const char *format, va_list arguments) {
+__attribute__((format(printf, 3, 0))) static void send_line(const vsh_run *run, const char *prefix,
+                                                            const char *format, va_list arguments) {
     vsh_error line;
     const int used = snprintf(line.message, sizeof line.message, "%s", prefix);
     vsnprintf(line.message + used, sizeof line.message - (size_t)used, format, arguments);

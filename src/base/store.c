@@ -77,7 +77,9 @@ vsh_result vshi_store_take(vshi_store *store, void **memory, size_t count, size_
     if (bytes >= (double)SIZE_MAX / 2.0) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: %g bytes are more than there can be", what, bytes);
     }
-    const vsh_result fits = vshi_check_limit(store->run, bytes + (double)store->held, what, error);
+    /* With a file to turn to, planes leave an eighth of the limit to samples, charts and casters. */
+    const double room = (store->folder != NULL ? 8.0 / 7.0 : 1.0) * (bytes + (double)store->held);
+    const vsh_result fits = vshi_check_limit(store->run, room, what, error);
     if (fits == VSH_OK) {
         VSHI_TRY(map_memory(store, &stored, what, error));
     } else if (store->folder == NULL) {

@@ -6,6 +6,10 @@
 #include <complex.h>
 #include <stdlib.h>
 
+#ifndef CMPLX /* glibc 2.36 defines it for gcc only */
+#define CMPLX(x, y) __builtin_complex((double)(x), (double)(y))
+#endif
+
 static const char what[] = "laying out a chart";
 
 static const double PLANAR =
