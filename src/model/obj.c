@@ -157,14 +157,14 @@ static vsh_result gather(vshi_obj *obj, int kind, int number, vsh_model *model, 
     vshi_obj_values *values = &obj->kinds[kind];
     for (size_t m = 0; m < obj->mesh_count; ++m) {
         const vshi_model_array array = vshi_model_array_of(&model->shapes[m], number);
-        const vshi_obj_vertex *vertices = obj->vertices + obj->meshes[m].first_vertex;
+        const size_t first = obj->meshes[m].first_vertex;
         size_t capacity = 0;
         if (!obj->meshes[m].has[kind]) {
             continue;
         }
         VSHI_TRY(vshi_reserve(&obj->budget, array.at, &capacity, array.count, array.size, error));
         for (size_t v = 0; v < array.count; ++v) {
-            const uint32_t part = vertices[v].part[kind];
+            const uint32_t part = obj->vertices[first + v].part[kind];
             char *to = (char *)*array.at + array.size * v;
             if (part > 0) {
                 memcpy(to, (const char *)values->values + array.size * (part - 1), array.size);
@@ -182,8 +182,8 @@ static vsh_result gather(vshi_obj *obj, int kind, int number, vsh_model *model, 
 /* The faces' corners are what triangles are made of; where all are triangles, they are that. */
 static vsh_result make_triangles(vshi_obj *obj, size_t m, vshi_model_shape *shape, vsh_error *error) {
     const vshi_obj_mesh *mesh = &obj->meshes[m];
-    const vshi_face_run *runs = obj->faces.runs + mesh->first_run;
     const size_t run_count = run_end(obj, m) - mesh->first_run;
+    const vshi_face_run *runs = run_count > 0 ? obj->faces.runs + mesh->first_run : NULL;
     size_t capacity = 0;
     bool triangles;
     const size_t most = vshi_faces_most(runs, run_count, &triangles);
