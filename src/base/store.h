@@ -1,4 +1,5 @@
-/* Arrays as large as a lightmap. Those that the memory limit has no room for lie in files without a name. */
+/* Arrays as large as a lightmap. If seven eighths of the memory limit have no room for one, it lies in a file
+ * without a name. */
 #ifndef VSHI_STORE_H
 #define VSHI_STORE_H
 

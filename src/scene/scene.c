@@ -397,7 +397,7 @@ static const vshi_key scene_keys[] = {
     VSHI_KEY("resolution", INTEGER, AT(grid.resolution), .lowest = 2.0, .highest = 65536.0,
              .flag = offsetof(vsh_scene, voxels_named), .then = drop_voxel_size,
              VSHI_OPTION("resolution", "N", CASTERS, "voxels along the longest side of the casters",
-                         .otherwise = "what pays: see docs/accuracy.md")),
+                         .otherwise = "automatic: see docs/accuracy.md")),
     VSHI_KEY("half_width", NUMBER, AT(grid.half_width), .lowest = 3.0, .highest = 100.0,
              VSHI_OPTION("half-width", "VOXELS", LEVEL_SET, "half width of the narrow band")),
     VSHI_KEY("shell_thickness", NUMBER, AT(grid.shell_thickness), .lowest = 1.0, .highest = 50.0,

@@ -102,6 +102,9 @@ load parts
     options=("${CLOISTER[@]}" --size 2048x128 --irradiance --bent-normals tangent --sky y --error)
     one out.exr "${options[@]}"
     parts out.exr 3 "" "${options[@]}"
+    local sizes
+    mapfile -t sizes < <(stat -c %s out.exr.?-of-3.part | sort -n)
+    [ "${sizes[2]}" -lt $((2 * sizes[0])) ] || fail "parts of ${sizes[*]} bytes"
     succeed merge out.exr --memory-limit 16M
     cmp one/out.exr out.exr
 }
