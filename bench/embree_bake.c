@@ -14,13 +14,14 @@
 #include "common.h"
 #include "embree_rays.h"
 #include "field/field.h"
+#include "scene/assets.h"
 #include "trace/embree_scene.h"
 
 #include <getopt.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <vdbshade/reader.h>
+#include <vdbshade/base.h>
 
 typedef struct options {
     const char *input, *output, *stats;
@@ -93,7 +94,7 @@ static options parse(int argc, char **argv) {
 
 /* What stands for a field in the rules of where rays begin: one whose distances are 0 everywhere, which
  * proves nothing. */
-static const vsh_field *field_of_nothing_known(const vsh_triangles *triangles) {
+static const vsh_field *field_of_nothing_known(const vshi_triangles *triangles) {
     static int32_t index[8];
     static int16_t values[VSHI_BRICK_VALUES];
     static vsh_field field = {.index = index, .values = values, .level_count = 1};
@@ -244,8 +245,8 @@ int main(int argc, char **argv) {
     const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &mesh_count);
     bench_check(vsh_receiver_charts(&scene, 0, meshes, mesh_count, &run, &charts, &error), &error);
     at[1] = vshi_seconds() - start;
-    vsh_triangles *triangles = NULL;
-    bench_check(vsh_scene_triangles(&scene, assets, NULL, &run, &triangles, &error), &error);
+    vshi_triangles *triangles = NULL;
+    bench_check(vshi_scene_triangles(&scene, assets, NULL, &run, &triangles, &error), &error);
     at[2] = vshi_seconds() - start;
     vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, o.rays, o.frame);
     baking b = {.net = sampler != NULL ? bench_rays_net(sampler, o.rays) : NULL};
@@ -255,16 +256,15 @@ int main(int argc, char **argv) {
     }
     /* samples begin, and are valid, as of casters that are traced only */
     vsh_occluders *occluders = NULL;
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    vshi_occluder_parts parts = {.field = NULL};
     parts.triangles = triangles;
     parts.field = field_of_nothing_known(triangles);
-    bench_check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    bench_check(vshi_occluders_from_parts(&parts, &occluders, &error), &error);
     vsh_shade_options exact = vsh_shade_options_default();
     exact.method = VSH_SHADOW_EXACT;
     exact.ao_method = VSH_AO_EXACT;
     exact.ao_distance = o.ao > 0.0 ? o.ao : exact.ao_distance;
-    const vshi_origins_for what = {.lights = o.lit, .ao = scene.ao != 0};
-    b.placement = vshi_placement_open(occluders, &exact, what, run.isa);
+    b.placement = vshi_placement_open(occluders, &exact, o.lit, scene.ao != 0, run.isa);
     vshi_store store = {.run = &run};
     vshi_channels channels;
     bench_check(vshi_channels_name(&scene, o.size, o.size, &channels, &error), &error);
@@ -296,7 +296,7 @@ int main(int argc, char **argv) {
     vsh_occluders_free(occluders);
     free(b.net);
     vshi_sampler_free(sampler);
-    vsh_triangles_free(triangles);
+    vshi_triangles_free(triangles);
     vsh_charts_free(charts);
     vsh_assets_free(assets);
     return 0;

@@ -135,7 +135,7 @@ static bool is_away(const vshi_light_place *light, size_t count, const float *no
 void bench_rays_trace(const bench_rays_task *task, const uint32_t (*net)[2], size_t count,
                       const double *origins, const float *normals, const float *faces, const uint32_t *texels,
                       float *values) {
-    const vsh_triangles *t = task->triangles;
+    const vshi_triangles *t = task->triangles;
     const int bits = bits_of(task->rays);
     for (size_t first = 0; first < count; first += LANES) {
         const size_t some = count - first < LANES ? count - first : LANES;

@@ -2,13 +2,13 @@
 #ifndef BENCH_EMBREE_RAYS_H
 #define BENCH_EMBREE_RAYS_H
 
-#include "light/view.h"
+#include "light/light.h"
 #include "trace/embree.h"
 #include "trace/sampler.h"
 
 /* Of texels that follow each other: a light's visible fraction, or what is open around them. */
 typedef struct bench_rays_task {
-    const vsh_triangles *triangles;
+    const vshi_triangles *triangles;
     const vshi_sampler *sampler; /* of VSH_SAMPLER_SOBOL, and `rays` rays */
     int32_t rays;
     const vshi_light_place *light; /* parallel; NULL: AO, within */

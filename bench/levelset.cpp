@@ -89,15 +89,15 @@ void measure(FILE *csv, const char *name, const std::vector<vsh_mesh> &meshes) {
     vsh_grid_info info;
     for (int i = 0; i < RUNS; ++i) {
         vsh_grid *grid = nullptr;
-        vsh_field *field = nullptr;
+        vsh_occluders *occluders = nullptr;
         times[0].push_back(milliseconds([&] {
             bench_check(vsh_grid_from_meshes(meshes.data(), meshes.size(), &options, &run, &grid, &error),
                         &error);
         }));
         times[1].push_back(milliseconds(
-            [&] { bench_check(vsh_field_create(grid, nullptr, &run, &field, &error), &error); }));
+            [&] { bench_check(vsh_occluders_from_grid(grid, nullptr, &run, &occluders, &error), &error); }));
         vsh_grid_get_info(grid, &info);
-        vsh_field_free(field);
+        vsh_occluders_free(occluders);
         vsh_grid_free(grid);
         times[2].push_back(milliseconds([&] { mesh_to_volume(all, info.voxel_size, options.half_width); }));
     }

@@ -21,17 +21,10 @@ def compare(v, truth, channel, path, of_file, *valid):
     return [len(error), math.sqrt(numpy.mean(error**2)), error.mean(), numpy.percentile(abs(error), 99), abs(error).max()]
 
 
-def write_area_truth(v, path, asset, size, sun, degrees, distance, rays, samples, lift=1e-5):
-    """Writes shadow.sun, ao and A, means over samples × samples places of each texel, by rays from the very surface."""
+def write_area_truth(v, path, asset, size, sun, degrees, distance, rays, samples):
+    """Writes shadow.sun, ao and A, means over samples × samples places of each texel, by rays against the triangles."""
     meshes = v.Model(asset)
-    triangles = v.Triangles(meshes)
-    found = v.Charts(meshes, width=size, height=size, supersample=samples).texels().samples
-    at = found["positions"] + lift * found["geometric_normals"]
-    texels = (found["texels"] >> 16) * size + (found["texels"] & 0xffff)
-    count = numpy.bincount(texels, minlength=size * size)
+    charts = v.Charts(meshes, width=size, height=size, supersample=samples, padding=0)
     light = v.Light(direction=sun, angle=math.radians(degrees))
-    planes = dict(A=(count > 0).astype(numpy.float32))
-    for name, values in (("shadow.sun", v.trace_shadow(at, found["normals"], light, triangles=triangles, rays=rays)),
-                         ("ao", v.trace_ao(at, found["normals"], distance, triangles=triangles, rays=rays))):
-        planes[name] = (numpy.bincount(texels, values, size * size) / numpy.maximum(count, 1)).astype(numpy.float32)
-    v.image_write(path, {name: plane.reshape(size, size) for name, plane in planes.items()})
+    v.bake_lightmap(v.Occluders(meshes), charts, light, ao=True, ao_distance=distance, method="exact", ao_method="exact", rays=rays,
+                    max_error=1e-4, frame=1).write(path)

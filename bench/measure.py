@@ -73,12 +73,11 @@ def feature(name):
     options = dict(dict(lights=[sun()], method="cone", ao_distance=AO_DISTANCE, run=ONE), **FEATURES[name])
     charts_options = {key: options.pop(key) for key in ("padding", "supersample") if key in options}
     meshes = v.Model(ASSETS / "cloister.glb")
-    field = v.Field(v.Grid.from_meshes(meshes, resolution=256))
-    pathlib.Path("/proc/self/clear_refs").write_text("5")  # the peak so far is forgotten
+    occluders = v.Occluders(meshes, resolution=256, triangles=options["method"] == "exact", run=ONE)
+    tree = occluders.info.triangles_s
+    pathlib.Path("/proc/self/clear_refs").write_text("5")  # forgets the peak so far
     before = status_bytes("VmRSS")
-    tree, triangles = timed(v.Triangles, meshes, run=ONE) if options["method"] == "exact" else (0.0, None)
     texels, charts = timed(v.Charts, meshes, width=512, height=512, run=ONE, **charts_options)
-    occluders = v.Occluders.from_parts(field, triangles=triangles)
     seconds, peaks = [], []
     for _ in range(5):
         second, lightmap = timed(v.bake_lightmap, occluders, charts, **options)
@@ -118,18 +117,16 @@ def ring(edge):
 
 
 def stages(meshes, resolution=256, size=512, lights=1, threads=1, clock=time.process_time):
-    """Seconds of each stage, and the field's bytes."""
+    """Seconds of each stage (those of occluders by the wall clock), and the field's bytes."""
     run = v.Run(threads=threads)
-    voxelize, grid = timed(v.Grid.from_meshes, meshes, resolution=resolution, run=run, clock=clock)
-    make_field, field = timed(v.Field, grid, run=run, clock=clock)
-    tree, triangles = timed(v.Triangles, meshes, run=run, clock=clock)
+    marched, traced = (v.Occluders(meshes, resolution=resolution, triangles=kept, run=run) for kept in (False, True))
+    made = traced.info
     texels, charts = timed(v.Charts, meshes, width=size, height=size, run=run, clock=clock)
-    marched, traced = v.Occluders.from_parts(field), v.Occluders.from_parts(field, triangles=triangles)
     suns = [sun(f"sun{i}", 2 * math.pi * i / 8) for i in range(lights)]
     bakes = [(marched, suns, dict(method="cone")), (marched, [], dict(ao=True, ao_method="cones", ao_distance=AO_DISTANCE)),
              (traced, suns, dict(method="exact", max_error=0.05))]
     baked = [median(v.bake_lightmap, o, charts, lit, runs=3, run=run, clock=clock, **more)[0] for o, lit, more in bakes]
-    return [voxelize, make_field, tree, texels, *baked, field.info.bytes]
+    return [made.voxelize_s, made.field_s, made.triangles_s, texels, *baked, made.field_bytes]
 
 
 def scaling():
@@ -264,12 +261,29 @@ def light_of(name, info, wider):
     return v.Light("sphere", position=(low + high) / 2 + numpy.multiply(direction, extent), radius=wider * size * extent)
 
 
+def corners_of(mesh):
+    """Corners of triangles, world units: (n, 3, 3)."""
+    m = numpy.eye(3, 4) if mesh.transform is None else mesh.transform
+    return (mesh.positions @ m[:, :3].T + m[:, 3])[mesh.indices]
+
+
+def truth_of(meshes):
+    """Shadow and AO at points by rays against the triangles."""
+    occluders = v.Occluders(meshes)
+    many = dict(max_error=1e-4, frame=1)
+    return (lambda at, up, light, rays: v.shade_shadow(occluders, at, up, light, method="exact", rays=rays, **many),
+            lambda at, up, distance, rays: v.shade_ao(occluders, at, up, ao_method="exact", ao_distance=distance, rays=rays, **many))
+
+
 def points_on(meshes, field, seed):
-    """Runs of 64 texels from all over a lightmap of 1024² that the field has outside of solids: positions, normals."""
-    samples = v.Charts(meshes, width=1024, height=1024).texels().samples
-    runs, wanted = len(samples["texels"]) // 64, POINTS // 64
-    chosen = (((numpy.arange(wanted) * runs // wanted + seed) % runs)[:, None] * 64 + numpy.arange(64)).reshape(-1)
-    at, up = samples["positions"][chosen], samples["geometric_normals"][chosen]
+    """Positions and normals on triangles, in runs of 64 near to each other. The field has them outside of solids."""
+    corners, random = numpy.concatenate([corners_of(mesh) for mesh in meshes]), numpy.random.default_rng(seed)
+    normals = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = numpy.linalg.norm(normals, axis=1)
+    chosen = random.choice(len(corners), POINTS // 64, p=area / area.sum())
+    weights = 0.9 * random.dirichlet((1, 1, 1), (len(chosen), 1)) + 0.1 * random.dirichlet((1, 1, 1), (len(chosen), 64))
+    at = numpy.einsum("rpc,rcx->rpx", weights, corners[chosen]).reshape(-1, 3)
+    up = numpy.repeat(normals[chosen] / area[chosen, None], 64, axis=0).astype(numpy.float32)
     voxel = field.info.voxel_size
     valid = field.sample(at + voxel * up) >= 0.25 * voxel
     return at[valid], up[valid]
@@ -295,18 +309,18 @@ def proofs():
     yield ["scene", "voxels", "light", "valid", "proved", "free", "near", "wrong"]
     for scene in ("cloister", "smooth", "thin"):
         meshes = v.Model(ASSETS / f"{scene}.glb")
-        triangles = v.Triangles(meshes)
+        trace_shadow, _ = truth_of(meshes)
         for seed, resolution in enumerate((512, 128, 64, 32)):
-            field = v.Field(v.Grid.from_meshes(meshes, resolution=resolution))
+            occluders = v.Occluders(meshes, resolution=resolution)
+            field = occluders.field
             at, up = points_on(meshes, field, 77 + seed)
-            occluders = v.Occluders.from_parts(field, triangles=triangles)
             for name in LIGHTS:
                 light = light_of(name, field.info, 1.0)
                 values, sure = proved(occluders, at, up, light)
                 near = sure & ~proved(occluders, at, up, light_of(name, field.info, WIDER))[1]
                 wrong = 0
                 for chosen, rays in ((sure & ~near, RAYS), (near, MORE_RAYS)):
-                    truth = v.trace_shadow(at[chosen], up[chosen], light, triangles=triangles, lift=LIFT, rays=rays)
+                    truth = trace_shadow(at[chosen] + LIFT * up[chosen], up[chosen], light, rays)
                     wrong += (truth != values[chosen]).sum()
                 yield [scene, resolution, name, len(at), sure.sum(), (values[sure] == 1).sum(), near.sum(), wrong]
 
@@ -336,18 +350,15 @@ def long_calls():
     """Calls by their names; casters at 256 voxels, lightmaps and pictures of 512²."""
     meshes, voxels = v.Model(ASSETS / "cloister.glb"), dict(resolution=256)
     grid = v.Grid.from_meshes(meshes, **voxels)
-    field, triangles, size = v.Field(grid, reach=2.0), v.Triangles(meshes), dict(width=512, height=512)
-    marched, traced = v.Occluders.from_parts(field), v.Occluders.from_parts(field, triangles=triangles)
+    size, marched, traced = dict(width=512, height=512), v.Occluders.from_grid(grid, reach=2.0), v.Occluders(meshes, reach=2.0, **voxels)
     charts, box, lamp = v.Charts(meshes, **size), v.Voxels.from_grid(grid), sun(angle=0.2)
-    font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
-    outline = v.Outline.from_text("The quick brown fox jumps over the lazy dog", font)
-    letters = "\n".join("ABCDEFGHIJKLMNOPQRSTUVWXYZ" * 2 for _ in range(80))
-    samples = charts.texels().samples
-    chosen = numpy.arange(1 << 18) * 7919 % len(samples["texels"])
-    at, up = samples["positions"][chosen], samples["normals"][chosen]
+    turns = numpy.linspace(0, 2 * numpy.pi, 20000, endpoint=False)
+    star = (1 + 0.3 * numpy.cos(9 * turns))[:, None] * numpy.stack([numpy.cos(turns), numpy.sin(turns)], axis=1)
+    outline = v.Outline.from_polygons([star])
+    at, up = points_on(meshes, marched.field, 1)
     query = v.Query(marched, lamp)
     camera = v.Camera().frame(grid.info.bounds_min, grid.info.bounds_max, 0.5, 0.5, 1.0)
-    disc = v.Light("sphere", position=(0, 2, 0), radius=0.5, name="lamp")
+    flat = v.FlatScene(ROOT / "tests/golden/flat.json", size=512)
 
     def bake(shadow, ao):
         return lambda run: v.bake_lightmap(traced, charts, lamp, ao=True, method=shadow, ao_method=ao, max_error=0.1, run=run)
@@ -358,19 +369,17 @@ def long_calls():
         "grid_from_meshes": lambda run: v.Grid.from_meshes(meshes, run=run, **voxels),
         "grid_from_sdf": lambda run: v.Grid.from_sdf(v.Sdf("sphere"), run=run, **voxels),
         "grid_unite": lambda run: v.Grid.unite([grid, (grid, [[1, 0, 0, 0.123], [0, 1, 0, 0.3], [0, 0, 1, 0]])], run=run, **voxels),
-        "outline_from_text": lambda run: v.Outline.from_text(letters, font, run=run),
-        "outline_from_image": lambda run: v.Outline.from_image(ASSETS / "emblem.png", run=run),
+        "outline_from_polygons": lambda run: v.Outline.from_polygons([star], run=run),
         "grid_from_outline": lambda run: v.Grid.from_outline(outline, 1.0, run=run, **voxels),
-        "field_create": lambda run: v.Field(grid, reach=2.0, run=run),
+        "occluders_from_grid": lambda run: v.Occluders.from_grid(grid, reach=2.0, run=run),
         "charts_create": lambda run: v.Charts(meshes, run=run, **size),
-        "triangles_create": lambda run: v.Triangles(meshes, run=run),
+        "occluders_create": lambda run: v.Occluders(meshes, run=run),
         "bake cones": bake("cone", "cones"), "bake adaptive": bake("adaptive", "adaptive"), "bake exact": bake("exact", "exact"),
         "voxels_from_grid": lambda run: v.Voxels.from_grid(grid, run=run),
         "bake_volume": lambda run: v.bake_volume(marched, box, lamp, ao=True, run=run),
-        "render": lambda run: v.render([field], marched, lamp, camera=camera, ao=True, shafts=0.5, run=run, **size),
-        "flat_bake": lambda run: v.flat_bake(outline, disc, region_max=(30, 1), run=run, **size),
-        "query_points": lambda run: query.points(at, up, ao=True, run=run),
-        "trace_ao": lambda run: v.trace_ao(at[: 1 << 15], up[: 1 << 15], 1.0, triangles=triangles, lift=0.01, rays=16, run=run)}
+        "render": lambda run: v.render([marched.field], marched, lamp, camera=camera, ao=True, shafts=0.5, run=run, **size),
+        "flat_bake": lambda run: flat.bake(run=run),
+        "query_points": lambda run: query.points(at, up, ao=True, run=run)}
 
 
 def cancel():
@@ -396,7 +405,7 @@ def cancel():
 def edges_of(mesh):
     """Edges of triangles, the lower end first, world units: (3 n, 2 ends, x y z | normal | uv)."""
     m = numpy.eye(3, 4) if mesh.transform is None else mesh.transform
-    at = (mesh.positions @ m[:, :3].T + m[:, 3])[mesh.indices]
+    at = corners_of(mesh)
     flat = numpy.cross(at[:, 1] - at[:, 0], at[:, 2] - at[:, 0])[:, None] + 0 * at
     normal = flat if mesh.normals is None else (mesh.normals @ m[:, :3].T)[mesh.indices]
     normal = normal / numpy.maximum(numpy.linalg.norm(normal, axis=2, keepdims=True), 1e-30)
@@ -439,15 +448,15 @@ def seams(truth_rays=1024):
     with tempfile.TemporaryDirectory() as folder:
         for asset in ("cloister", "smooth"):
             model = ASSETS / f"{asset}.glb"
-            meshes, triangles = v.Model(model), v.Triangles(v.Model(model))
+            meshes = v.Model(model)
+            trace_shadow, trace_ao = truth_of(meshes)
             for size in (256, 1024):
                 places, path = seam_places(meshes, size), pathlib.Path(folder) / "out.exr"
                 truths = []
                 for side in (0, 1):
                     up = places[:, side, 3:6] / numpy.linalg.norm(places[:, side, 3:6], axis=1, keepdims=True)
                     at, up = places[:, side, :3] + 1e-5 * up, up.astype(numpy.float32)
-                    truths.append({"shadow.sun": v.trace_shadow(at, up, sun(), triangles=triangles, rays=1024),
-                                   "ao": v.trace_ao(at, up, AO_DISTANCE, triangles=triangles, rays=1024)})
+                    truths.append({"shadow.sun": trace_shadow(at, up, sun(), 1024), "ao": trace_ao(at, up, AO_DISTANCE, 1024)})
                 subprocess.run([BUILD / "bench/vsh_embree_bake", model, "-o", path, "--size", str(size), *light, "--rays", str(truth_rays),
                                 "--frame", "7"], check=True)
                 found = {"truth": (v.image_read(path), 0.0)}
@@ -456,7 +465,7 @@ def seams(truth_rays=1024):
                 found["keep"] = (v.image_read(path), seconds)
                 stitched = {name: numpy.array(found["keep"][0][name]) for name in ("shadow.sun", "ao", "A")}
                 charts = v.Charts(meshes, width=size, height=size)
-                found["fix"] = (stitched, timed(v.lightmap_stitch, charts, stitched, max_change=0.02, run=ONE)[0])
+                found["fix"] = (stitched, timed(v.lightmaps_stitch, [(charts, stitched)], max_change=0.02, run=ONE)[0])
                 for what, (planes, seconds) in found.items():
                     for channel in ("shadow.sun", "ao"):
                         sides = [look_up(planes[channel], places[:, side, 6:]) for side in (0, 1)]

@@ -4,9 +4,13 @@
  *
  *   vsh_methods FILE.csv */
 #include "analytic.h"
+#include "bake/texels.h"
 #include "common.h"
+#include "field/field.h"
 #include "metrics.h"
 #include "packets.h"
+#include "scene/assets.h"
+#include "shade/occluders.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -69,13 +73,13 @@ static double shade_seconds(int runs, const vsh_occluders *occluders, const vsh_
     return median(seconds, (size_t)runs);
 }
 
-static vsh_occluders *make_occluders(const vsh_field *field, const vsh_triangles *triangles) {
+static vsh_occluders *make_occluders(const vsh_field *field, const vshi_triangles *triangles) {
     vsh_error error;
     vsh_occluders *occluders = NULL;
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    vshi_occluder_parts parts = {.field = NULL};
     parts.field = field;
     parts.triangles = triangles;
-    bench_check(vsh_occluders_from_parts(&parts, &occluders, &error), &error);
+    bench_check(vshi_occluders_from_parts(&parts, &occluders, &error), &error);
     return occluders;
 }
 
@@ -127,10 +131,10 @@ static vsh_field *make_seeds_field(void) {
     bench_check(vsh_scene_read(VSH_ASSETS "/seeds.json", NULL, &scene, &error), &error);
     bench_check(vsh_assets_load(scene, &run, &assets, &error), &error);
     bench_check(vsh_scene_casters(scene, assets, &run, &grid, &error), &error);
-    vsh_field_options options = vsh_field_options_default();
+    vshi_field_options options = vshi_field_options_default();
     const double low[3] = {-2.5, 0.0, -2.5}, high[3] = {2.5, 0.0, 2.5};
-    options.reach = vsh_scene_reach(scene, grid, low, high);
-    bench_check(vsh_field_create(grid, &options, &run, &field, &error), &error);
+    options.reach = vshi_scene_reach(scene, grid, low, high);
+    bench_check(vshi_field_create(grid, &options, &run, &field, &error), &error);
     vsh_grid_free(grid);
     vsh_assets_free(assets);
     vsh_scene_free(scene);
@@ -157,7 +161,7 @@ static void measure_seeds(FILE *csv) {
     free(values);
     free(normals);
     free(positions);
-    vsh_field_free(field);
+    vshi_field_free(field);
 }
 
 /* --- Embree's time */
@@ -244,9 +248,9 @@ static const double CREASE = 0.75, CLEAR = 0.25;
  */
 static receiver take_texels(const vsh_field *field, const vsh_charts *charts) {
     vsh_error error;
-    vsh_texels *texels;
-    bench_check(vsh_texels_create(charts, NULL, &texels, &error), &error);
-    const vsh_texel_samples s = vsh_texels_samples(texels);
+    vshi_texels *texels;
+    bench_check(vshi_texels_create(charts, NULL, &texels, &error), &error);
+    const vshi_texel_samples s = vshi_texels_samples(texels);
     vsh_field_info info;
     vsh_field_get_info(field, &info);
     const size_t triples = s.count * 3 * sizeof(double);
@@ -279,7 +283,7 @@ static receiver take_texels(const vsh_field *field, const vsh_charts *charts) {
         }
         r.valid[r.count++] = clear >= CLEAR ? 1.0f : 0.0f;
     }
-    vsh_texels_free(texels);
+    vshi_texels_free(texels);
     return r;
 }
 
@@ -290,7 +294,7 @@ static void measure_asset(FILE *csv) {
     vsh_model *model = NULL;
     vsh_grid *grid = NULL;
     vsh_field *field = NULL;
-    vsh_triangles *triangles = NULL;
+    vshi_triangles *triangles = NULL;
     bench_check(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &error), &error);
     const size_t mesh_count = vsh_model_mesh_count(model);
     vsh_mesh *meshes = bench_take(mesh_count * sizeof *meshes);
@@ -300,7 +304,7 @@ static void measure_asset(FILE *csv) {
     vsh_grid_options voxels = vsh_grid_options_default();
     voxels.resolution = RESOLUTION;
     bench_check(vsh_grid_from_meshes(meshes, mesh_count, &voxels, NULL, &grid, &error), &error);
-    bench_check(vsh_field_create(grid, NULL, NULL, &field, &error), &error);
+    bench_check(vshi_field_create(grid, NULL, NULL, &field, &error), &error);
     vsh_lightmap_options size = vsh_lightmap_options_default();
     size.width = size.height = SIZE;
     bench_check(vsh_charts_create(meshes, mesh_count, &size, &run, NULL, &charts, &error), &error);
@@ -331,7 +335,7 @@ static void measure_asset(FILE *csv) {
     question.towards = NULL;
     question.distance = AO_DISTANCE;
     ray = measure_embree(csv, "cloister", mesh, &question, truth, r.valid, values);
-    bench_check(vsh_triangles_create(meshes, mesh_count, &run, &triangles, &error), &error);
+    bench_check(vshi_triangles_create(meshes, mesh_count, &run, &triangles, &error), &error);
     vsh_occluders *traced = make_occluders(field, triangles);
     const struct {
         const char *name;
@@ -373,7 +377,7 @@ static void measure_asset(FILE *csv) {
     }
     vsh_occluders_free(traced);
     vsh_occluders_free(marched);
-    vsh_triangles_free(triangles);
+    vshi_triangles_free(triangles);
     free(truth);
     free(values);
     free(r.valid);
@@ -383,7 +387,7 @@ static void measure_asset(FILE *csv) {
     free(r.positions);
     truth_mesh_free(mesh);
     vsh_charts_free(charts);
-    vsh_field_free(field);
+    vshi_field_free(field);
     vsh_grid_free(grid);
     free(meshes);
     vsh_model_free(model);

@@ -51,7 +51,7 @@ if(NOT TARGET vsh::openexr)
   target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::meshoptimizer vsh::jansson
                                                     vsh::nettle vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
-  # Its headers, and the name that src/trace/embree_load.c loads it by.
+  # Its headers, and the name that src/trace/embree.c loads it by.
   get_target_property(config embree IMPORTED_CONFIGURATIONS)
   list(GET config 0 config)
   get_target_property(soname embree IMPORTED_SONAME_${config})

@@ -2,7 +2,7 @@
 cmake_minimum_required(VERSION 3.25)
 
 string(REPLACE "," ";" pages "${PAGES}")
-set(text "/* Made by cmake/embed_docs.cmake. */\n#include \"cli/commands.h\"\n")
+set(text "/* Made by cmake/embed_docs.cmake. */\n#include \"cli/cli.h\"\n")
 set(rows "")
 set(count 0)
 foreach(page ${pages})

@@ -1,4 +1,5 @@
-# `import vdbshade`: src/bindings/python/vdbshade, and what src/bindings/python/generate.py makes of the public headers. In
+# `import vdbshade`: src/bindings/python/vdbshade, and what src/bindings/python/generate.py makes of the public headers
+# and bindings.h. In
 # the build folder it is used by PYTHONPATH=FOLDER/python.
 #
 # The Python that is asked for is the system's, whose packages numpy and cffi are: the first one of PATH may be another.
@@ -11,13 +12,14 @@ if(failed)
 endif()
 
 set(python ${PROJECT_SOURCE_DIR}/src/bindings/python)
+set(private ${PROJECT_SOURCE_DIR}/src/bindings/bindings.h)
 set(VSH_PYTHON_FOLDER ${PROJECT_BINARY_DIR}/python/vdbshade)
 file(GLOB sources CONFIGURE_DEPENDS RELATIVE ${python}/vdbshade ${python}/vdbshade/*.py ${python}/vdbshade/py.typed)
 file(GLOB public CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/vdbshade/*.h)
 set(made ${VSH_PYTHON_FOLDER}/_abi.py ${VSH_PYTHON_FOLDER}/_tables.py ${VSH_PYTHON_FOLDER}/types.py)
 add_custom_command(OUTPUT ${made}
-                   COMMAND ${VSH_PYTHON_PROGRAM} ${python}/generate.py ${PROJECT_SOURCE_DIR}/include ${VSH_PYTHON_FOLDER}
-                   DEPENDS ${python}/generate.py ${python}/headers.py ${public}
+                   COMMAND ${VSH_PYTHON_PROGRAM} ${python}/generate.py ${PROJECT_SOURCE_DIR}/include ${private} ${VSH_PYTHON_FOLDER}
+                   DEPENDS ${python}/generate.py ${public} ${private}
                    COMMENT "Declarations for Python" VERBATIM)
 foreach(source ${sources})
   add_custom_command(OUTPUT ${VSH_PYTHON_FOLDER}/${source}

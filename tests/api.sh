@@ -36,8 +36,8 @@ noticed() { # FILE SED WORD
     fi
 }
 noticed base.h 's|^/\* "0.2.0"; a static string. \*/$||' vsh_version
-noticed base.h '/^\/\* How to run, the same/d' vsh_run
+noticed base.h '/^\/\* Options of every call/d' vsh_run
 noticed base.h 's|^\(    int32_t threads; *\)/\*.*|\1|' threads
 noticed light.h 's|^\(    double radius; *\)/\*.*|\1|' radius
-noticed unwrap.h '/^\/\* The chart of a triangle/d' VSH_NO_CHART
+noticed lightmap.h '/^\/\* The chart of a triangle/d' VSH_NO_CHART
 echo "api: every symbol is documented"

@@ -9,8 +9,7 @@ includes=$here/../tools/includes
 # docs/architecture.md says the same.
 while read -r room _ rooms; do
     rooms=${rooms// /, }
-    [ "$room" != cli ] || rooms="base, table, public headers"
-    [ "$room" = umbrella ] || grep -q "^| $room | .* | $rooms |\$" "$here/../docs/architecture.md" ||
+    grep -q "^| $room | .* | $rooms |\$" "$here/../docs/architecture.md" ||
         { echo "docs/architecture.md: room $room: expected '$rooms' in the last column" && exit 1; }
 done < <(grep -E '^[a-z_]+ -> ' "$here/../tools/includes.txt")
 
@@ -23,7 +22,7 @@ make() {
     printf '#include <stdio.h>\n' >"$work/src/low/low.h"
     printf '#include "low/low.h"\n#include <api/high.h>\n' >"$work/src/high/high.c"
     printf '\n' >"$work/include/api/high.h"
-    printf 'room low: src/low/*\nroom high: src/high/* include/api/high.h\nhigh -> low\n' >"$work/tools/includes.txt"
+    printf 'room low: src/low/*\nroom high: src/high/*\nhigh -> low\n' >"$work/tools/includes.txt"
 }
 expect() { # CODE TEXT
     local code=0
@@ -41,15 +40,8 @@ printf 'except src/low/low.c -> src/high/high.h\n' >>"$work/tools/includes.txt"
 expect 0 "1 exceptions"
 rm "$work/src/low/low.c"
 expect 1 "no exception any more"
-make && printf '#include <api/high.h>\n' >"$work/src/low/low.h"
-expect 1 "src/low/low.h includes include/api/high.h: low may not include high"
 make && printf 'low -> high\n' >>"$work/tools/includes.txt"
 expect 1 "low -> high: not a room that is declared above it"
-make && printf 'room top: src/top/*\ntop -> high.h\n' >>"$work/tools/includes.txt" && mkdir "$work/src/top"
-printf '#include <api/high.h>\n' >"$work/src/top/top.c"
-expect 0 "top "
-printf '#include "high/high.h"\n' >"$work/src/top/top.c"
-expect 1 "src/top/top.c includes src/high/high.h: top may not include high"
 make && mkdir "$work/src/new" && printf '#include "low/low.h"\n' >"$work/src/new/new.c"
 expect 1 "src/new/new.c: in no room"
 echo "includes: what breaks the order is found"

@@ -25,11 +25,6 @@ typedef struct vsh_coverage {
     double share;     /* differs / texels covered in either; 0 if there are none */
 } vsh_coverage;
 
-/* Compares two planes of coverage [count]. Texels above 1/2 are covered (NULL: all are). Writes 1 into
- * mask[count] (may be NULL) where both are covered, else 0. Cannot fail. */
-VSH_API void vsh_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
-                                  vsh_coverage *coverage);
-
 /* --- values */
 
 /* Two planes of an image, or grids of voxels. A view; nothing is owned. */
@@ -139,34 +134,6 @@ typedef struct vsh_limits {
     vsh_compare_options options;     /* how its values are compared */
 } vsh_limits;
 
-/* Returns limits that pass rounding (another compiler, 16-bit files), and fail penumbrae a tenth wider, a
- * shift of a quarter of a texel, and a lost caster of four texels. */
-VSH_API vsh_limits vsh_limits_default(void);
-
-/* Widens limits, and sets options.noise, for bakes made by sampling: standard errors a and b make noise of
- * √(a² + b²), in units of the range, 0 … 1. docs/pipeline.md has the formulas. Set strict limits after
- * this call. Cannot fail. */
-VSH_API void vsh_limits_allow_noise(vsh_limits *limits, double noise);
-
-/* Returns bits: bit i is set if measure i fails. A measure that does not apply passes. If no value was
- * compared, all fail. */
-VSH_API uint32_t vsh_compare_judge(const vsh_measures *measures, const vsh_limits *limits);
-
-/* Limits from a JSON file (docs/pipeline.md): for all channels, and for single ones. */
-typedef struct vsh_tolerances vsh_tolerances;
-
-/* Reads such a file. Free it with vsh_tolerances_free(). Errors: VSH_ERROR_ARGUMENT (path or tolerances
- * NULL), VSH_ERROR_READ, VSH_ERROR_INPUT (no JSON, unknown keys, values out of range, with the place),
- * VSH_ERROR_LIMIT (the parsed file may take over 64 MiB). */
-VSH_API vsh_result vsh_tolerances_read(const char *path, vsh_tolerances **tolerances, vsh_error *error);
-VSH_API void vsh_tolerances_free(vsh_tolerances *tolerances); /* NULL does nothing */
-
-/* Overwrites *limits with the file's limits for a channel, and *coverage (may be NULL) with the share of
- * covered texels that may differ. Other limits stay. Does nothing if tolerances is NULL.
- * Cannot fail. */
-VSH_API void vsh_tolerances_apply(const vsh_tolerances *tolerances, const char *channel, vsh_limits *limits,
-                                  double *coverage);
-
 /* --- two files */
 
 /* Result for a channel of two images, or a grid of two .vdb files. */
@@ -180,21 +147,22 @@ typedef struct vsh_channel_comparison {
     double max_error[2];            /* --max-error of golden and new by their files; NaN: unknown */
     vsh_limits limits;              /* limits used */
     vsh_measures measures;          /* measured differences */
-    uint32_t failed;                /* bits as of vsh_compare_judge() */
+    uint32_t failed;                /* bit i is set if measure i fails */
     int32_t coverage_failed, alike; /* 1 or 0 */
 } vsh_channel_comparison;
 
 /* NaN, and a reach of -1, mean: use the tolerance file's value, else the default. */
 typedef struct vsh_compare_files_options {
     size_t struct_size;
-    const char *tolerances; /* file for vsh_tolerances_read(); NULL: GOLDEN.tolerance.json if it exists */
-    const char *coverage;   /* channel of images with coverage; if it is missing, everything is covered */
+    const char
+        *tolerances; /* JSON file of limits (docs/pipeline.md); NULL: GOLDEN.tolerance.json if it exists */
+    const char *coverage; /* channel of images with coverage; if it is missing, everything is covered */
     double limits[VSH_MEASURE_COUNT]; /* of all channels */
     double coverage_limit;            /* share of covered texels that may be in one file alone */
     double step;                      /* as of vsh_compare_options */
-    double noise;    /* as of vsh_limits_allow_noise(); NaN: from the max errors in the files, if these or
-                      * the methods, samplers or frames differ */
-    int32_t reach;   /* as of vsh_compare_options */
+    double noise;  /* standard error that sampling leaves, in units of the range; NaN: from the max errors in
+                    * the files, if these or  the methods, samplers or frames differ */
+    int32_t reach; /* as of vsh_compare_options */
     int32_t padding; /* 1: compare texels that are not covered, too */
     /* Called with the values of each measured channel; `index` is the channel's. The arrays are valid until
      * it returns. A nonzero result ends the comparison with VSH_ERROR_CANCELLED. May be NULL. */
@@ -218,7 +186,7 @@ typedef struct vsh_comparison vsh_comparison;
 /* Compares two images channel by channel, or two .vdb files grid by grid, over what both cover. Different
  * values are no error. Different sizes, channels, voxels or formats are problems of the comparison, not
  * errors. Free it with vsh_comparison_free(). Read files from strangers with run->reader (base.h).
- * Errors: those of vsh_tolerances_read(), vsh_image_read(), vsh_vdb_copy() and vsh_compare(), and
+ * Errors: those of vsh_image_read(), vsh_grid_read() and vsh_compare(), and
  * - VSH_ERROR_ARGUMENT: golden, fresh or comparison NULL, options, run;
  * - VSH_ERROR_INPUT: more than 4096 grids. */
 VSH_API vsh_result vsh_compare_files(const char *golden, const char *fresh,

@@ -1,4 +1,15 @@
-/* Triangle meshes: views of the caller's arrays, a check of them, and models read from files. */
+/* Meshes, models, heightfields, procedural SDFs and outlines: the shapes that cast and receive.
+ *
+ *     static const float positions[] = {-1, 0, -1, 1, 0, -1, 1, 0, 1, -1, 0, 1};
+ *     static const uint32_t indices[] = {0, 2, 1, 0, 3, 2};
+ *     vsh_mesh ground = {.name = "ground", .positions = positions, .vertex_count = 4,
+ *                        .indices = indices, .triangle_count = 2};
+ *     vsh_mesh_report report;
+ *     vsh_mesh_check(&ground, &report, &error);
+ *     vsh_model *model;
+ *     vsh_model_read("room.glb", &run, &model, &error);
+ *     vsh_mesh room = vsh_model_mesh(model, 0, -1); // a view; free the model last
+ */
 #ifndef VDBSHADE_MESH_H
 #define VDBSHADE_MESH_H
 
@@ -10,130 +21,141 @@ extern "C" {
 
 enum { VSH_MAX_UV_SETS = 8 };
 
-/* What a mesh is taken for. AUTO looks at each piece of it that hangs together by its edges: closed ones, and
- * open ones that enclose nearly all of what is behind their faces, are solid where their faces look outwards;
- * where they look inwards they are rooms, cut out of the solids around them, or else thin walls behind the
- * faces; what encloses nothing is a sheet with air on both sides. */
+/* Whether a mesh encloses a solid. AUTO decides for each connected component. Closed components, and open
+ * ones that enclose nearly all of what lies behind their faces, are solid if their faces look outwards. If
+ * their faces look inwards, they are rooms cut out of the solids around them, or else thin walls behind the
+ * faces. Components that enclose nothing are sheets with air on both sides. */
 enum {
     VSH_SOLIDITY_AUTO,
-    VSH_SOLIDITY_SOLID, /* what it encloses is solid whatever way its faces look, and closed over its holes */
+    VSH_SOLIDITY_SOLID, /* solid, closed over holes, whichever way faces look */
     VSH_SOLIDITY_SHELL, /* all sheets */
-    VSH_SOLIDITY_INWARD /* air in what it encloses, whatever way its faces look: a room or a wall */
+    VSH_SOLIDITY_INWARD /* a room or a wall: air inside, whichever way faces look */
 };
 
-/* What a mesh's material makes of light that comes through (glTF's alphaMode). */
+/* How the material of a mesh treats light that passes (glTF's alphaMode). */
 enum {
     VSH_ALPHA_OPAQUE = 0,
-    VSH_ALPHA_MASKED = 1, /* holes where its texture says so */
+    VSH_ALPHA_MASKED = 1, /* its texture cuts holes */
     VSH_ALPHA_BLENDED = 2 /* glass, smoke */
 };
 
-/* What a texture is where UVs leave 0 … 1. */
+/* How a texture continues outside 0 … 1. */
 enum {
     VSH_WRAP_REPEAT = 0,
     VSH_WRAP_MIRROR = 1, /* repeated, every other time mirrored */
-    VSH_WRAP_CLAMP = 2   /* its edge goes on */
+    VSH_WRAP_CLAMP = 2   /* its edge continues */
 };
 
-/* Which channel of an image a material's alpha is. */
+/* The channel of an image that is a material's alpha. */
 enum {
-    VSH_MASK_CHANNEL_ALPHA = 0, /* A; 1 where there is none */
+    VSH_MASK_CHANNEL_ALPHA = 0, /* A; 1 if there is none */
     VSH_MASK_CHANNEL_RED = 1,
     VSH_MASK_CHANNEL_GREEN = 2,
     VSH_MASK_CHANNEL_BLUE = 3,
-    VSH_MASK_CHANNEL_LUMINANCE = 4, /* 0.2126 R + 0.7152 G + 0.0722 B as they are in the file, or Y */
-    VSH_MASK_CHANNEL_AUTO = 5       /* A where it is below 1 anywhere, else the luminance */
+    VSH_MASK_CHANNEL_LUMINANCE = 4, /* 0.2126 R + 0.7152 G + 0.0722 B of stored values, or Y */
+    VSH_MASK_CHANNEL_AUTO = 5       /* A if it is below 1 anywhere, else the luminance */
 };
 
-/* Where a mesh is cut out by a texture: light comes through where base_alpha × the texture's alpha, looked up
- * bilinearly, is below alpha_cutoff (glTF 2.0, 3.9.4). A view; nothing is owned. */
+/* A texture that cuts a mesh: light passes where base_alpha × the texture's alpha, sampled bilinearly, is
+ * below alpha_cutoff (glTF 2.0, 3.9.4). A view. */
 typedef struct vsh_alpha_mask {
     const uint8_t *alpha;   /* [height][width], 255 is 1, row 0 on top (v = 1) */
     int32_t width, height;  /* texels, ≥ 1 */
     int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
-    double uv_transform[6]; /* rows (a, b, c), (d, e, f): looked up at u' = a u + b v + c, v' = d u + e v + f,
-                               v up in all; all finite */
+    double uv_transform[6]; /* rows (a, b, c), (d, e, f): sampled at u' = a u + b v + c, v' = d u + e v + f,
+                               with v up; finite */
     double alpha_cutoff;    /* ≥ 0 */
     double base_alpha;      /* 0 … 1 */
 } vsh_alpha_mask;
 
-/* A view of a triangle mesh: nothing is copied or owned. */
+/* A triangle mesh. A view: nothing is copied or owned. Zero the members that you do not need. */
 typedef struct vsh_mesh {
-    const char *name;       /* for messages; may be NULL */
-    const float *positions; /* [vertex_count][3], local units, finite */
-    const float *normals;   /* [vertex_count][3], shading normals of any length, or NULL: flat */
-    const float *uvs;       /* [vertex_count][2], lightmap coordinates, v up; NULL where no bake needs them */
-    const uint32_t *indices; /* [triangle_count][3], each < vertex_count, anticlockwise from outside */
+    const char *name;        /* for messages; may be NULL */
+    const float *positions;  /* [vertex_count][3], local units, finite */
+    const float *normals;    /* [vertex_count][3], shading normals of any length; NULL: flat */
+    const float *uvs;        /* [vertex_count][2], lightmap coordinates, v up; NULL if no bake needs them */
+    const uint32_t *indices; /* [triangle_count][3], each < vertex_count, anticlockwise seen from outside */
     size_t vertex_count;     /* at most 2^32 - 1 */
     size_t triangle_count;
-    const double *transform; /* [12], local to world, three rows of four (column 3 translates), may mirror,
+    const double *transform; /* [12], local to world, three rows of four (column 3 translates). It may mirror,
                                 scale unevenly and shear, but not flatten; NULL: identity */
-    const char *object_name; /* of the object that it is a part of; may be NULL: `name` */
-    uint32_t object;  /* meshes of one number are parts of one object (a part for each of its materials);
-                         0: an object of its own */
-    int32_t solidity; /* VSH_SOLIDITY_…; where it casts */
-    const struct vsh_checked_mesh *checked; /* what is known of views from a scene's assets, so that it is
-                                               not looked for again. Else NULL */
-    int32_t alpha;     /* VSH_ALPHA_…; what scenes make of it: vsh_caster.cast_blended */
-    int32_t one_sided; /* nonzero: where it casts, light that falls on the backs of its faces comes through,
-                          as where an engine culls back faces; methods that march voxels take no notice */
-    const vsh_alpha_mask *mask; /* where it is cut out; it casts so, and is a sheet whatever its solidity
-                                   says. NULL: nowhere */
-    const float *mask_uvs;      /* [vertex_count][2], texture coordinates for the mask, v up; where there is a
-                                   mask. What is not finite is opaque */
-    const char *material_name;  /* may be NULL */
+    const char *object_name; /* of the object that it belongs to; NULL: `name` */
+    uint32_t object;         /* meshes with equal numbers are parts of one object; 0: an object of its own */
+    int32_t solidity;        /* VSH_SOLIDITY_…, for casting */
+    const struct vsh_checked_mesh *checked; /* cached checks of views from a scene's assets; else NULL */
+    int32_t alpha;                          /* VSH_ALPHA_… */
+    int32_t one_sided; /* nonzero: light on the backs of its faces passes, as with back-face culling. Methods
+                          that march voxels ignore it */
+    const vsh_alpha_mask *mask; /* what cuts it; it then casts as a sheet. NULL: nothing */
+    const float *mask_uvs; /* [vertex_count][2], texture coordinates for `mask`, v up. Triangles with values
+                              that are not finite are opaque */
+    const char *material_name; /* may be NULL */
 } vsh_mesh;
 
-/* Whether a mesh is meant by `pattern`: "material:PATTERN" means those whose material's name PATTERN is, or
- * matches; any other its name, its object's name, or what its name has behind its object's
- * ("Wall", "Cube.003" and "Wall/Cube.003" for a node Wall with a mesh Cube.003) is `pattern`, or is matched
- * by it as a shell matches: * for anything, ? for one character, [a-c] for one byte of some, [!a-c] for one
- * of all others, \\ before what is meant as it is. Case counts. A mesh without names is called "". 1 or 0; 0
- * too where either is NULL. */
-VSH_API int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern);
-
-/* What vsh_mesh_check() found. Vertices at equal positions count as one, so seams of UVs open nothing. */
+/* Findings of vsh_mesh_check(). Vertices at equal positions count as one, so UV seams do not open edges. */
 typedef struct vsh_mesh_report {
     size_t degenerate_triangles; /* of zero area; they are skipped everywhere */
     size_t open_edges;           /* edges with an odd number of triangles */
     size_t flipped_edges;        /* edges whose triangles disagree about the outside */
-    double area;                 /* world units², of all triangles */
-    double bounds_min[3]; /* world units, over triangles of some area; min > max where there are none */
-    double bounds_max[3];
+    double area;                 /* of all triangles, world units² */
+    double bounds_min[3];        /* world box of the triangles with area; min > max if there are none */
+    double bounds_max[3];        /* the other corner */
 } vsh_mesh_report;
 
-/* Looks a mesh over; UVs and normals are not looked at. Errors (*report is then left alone):
- * - VSH_ERROR_ARGUMENT: mesh or report NULL, an array NULL whose count is not 0, more than 2^32 - 1
- *   vertices;
- * - VSH_ERROR_INPUT: a vertex that is not finite (or not once transformed), an index out of range, a
- *   transform that is not finite or flattens;
+/* Checks a mesh, except its UVs and normals. Errors (*report is then unchanged):
+ * - VSH_ERROR_ARGUMENT: mesh or report NULL; an array NULL whose count is not 0; more than 2^32 - 1 vertices;
+ * - VSH_ERROR_INPUT: a vertex that is not finite, before or after its transform; an index out of range; a
+ * transform that is not finite or flattens;
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 
-/* A file of meshes: OBJ, glTF or GLB (2.0), PLY, STL, FBX or Collada (.dae). A node's transform is that
- * of its mesh's view; a mesh that two nodes use is two meshes, and so are the instances of
- * EXT_mesh_gpu_instancing. The meshes of a node are one object, and its name that of the node. UVs have v up
- * in every format.
+/* Counts of a mesh's connected components by their solidity. Open surfaces that enclose nearly all of what
+ * lies behind their faces count as closed, by the generalized winding number (Jacobson, Kavan,
+ * Sorkine-Hornung 2013). */
+typedef struct vsh_solidity_report {
+    size_t solids; /* faces look outwards */
+    size_t rooms;  /* faces look inwards, within solids that they are cut out of */
+    size_t walls;  /* faces look inwards, not within solids, or the skin of a hollow house: thin walls with
+                      air on both sides */
+    size_t sheets; /* air on both sides */
+    size_t closed_over;      /* solids and rooms that are closed over holes */
+    size_t holes;            /* holes of those */
+    size_t open_edges;       /* edges around these holes */
+    size_t turned_triangles; /* triangles that face against their neighbours, and are turned over */
+    size_t open_solids; /* solids without a side: a house without a floor, a cup. Level sets make sheets of
+                           them; for rays, points that see only their insides are hidden */
+} vsh_solidity_report;
+
+/* Fills reports[mesh_count] for meshes that cast together. Consecutive parts of one object share a report.
+ * Errors: as vsh_mesh_check(); VSH_ERROR_LIMIT (run->memory_limit, more than 2^32 / 3 triangles in an
+ * object). */
+VSH_API vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                     vsh_solidity_report *reports, vsh_error *error);
+
+/* --- models: files of meshes
  *
- * - Units: positions are in metres where the format knows its unit (glTF: metres; FBX, Collada: as the
- *   file says); OBJ, PLY and STL are numbers as they are.
- * - Axes: as glTF has them, y up, in formats that know theirs (FBX, Collada); else as they are.
- * - Pose: skins at rest, that is as the nodes stand in the file; morph targets at their default weights.
- * - Polygons are cut into triangles that cover them exactly, concave ones too. */
+ * OBJ, glTF and GLB (2.0), PLY, STL, FBX and Collada (.dae). Each use of a mesh by a node or an instance
+ * (EXT_mesh_gpu_instancing) is a mesh of its own, with the node's transform. The meshes of a node form one
+ * object with the node's name. UVs have v up in every format.
+ *
+ * - Units: metres if the format knows its unit (glTF, FBX, Collada). OBJ, PLY and STL are unchanged.
+ * - Axes: y up if the format knows its axes (glTF, FBX, Collada), else unchanged.
+ * - Pose: skins at rest, morph targets at their default weights.
+ * - Polygons are triangulated exactly, concave ones too. */
+
+/* Immutable; threads may share it. Free it with vsh_model_free(). */
 typedef struct vsh_model vsh_model;
 
-/* Reads a model; the ending of `path` tells its format. Notes meshes that a transform flattens (left
- * out), and warns of normals that are not finite (flat there) and of polygons whose edges cross. Free the
- * result with vsh_model_free(). Errors:
+/* Reads a model; the ending of `path` gives its format. It skips meshes that a transform flattens, with a
+ * note. It warns about normals that are not finite (flat there) and polygons whose edges cross. Errors:
  * - VSH_ERROR_ARGUMENT: path or model NULL, run;
- * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, damaged, or a glTF's
- *   buffer that is not beside it;
- * - VSH_ERROR_UNSUPPORTED: a glTF that needs an extension that is not read, or of another version;
- * - VSH_ERROR_INPUT: no ending, or one of no format that is read (.blend, Alembic and USD files, by their
- *   first bytes too); no triangles; vertices that are not finite, indices out of range, a damaged header or
- *   JSON; a file that it names outside of its folder (run->allow_outside);
- * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for one of the file), nodes nested more than 1024
- *   deep;
+ * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, damaged; a glTF's buffer
+ * is missing;
+ * - VSH_ERROR_UNSUPPORTED: a glTF of another version, or that requires an unknown extension;
+ * - VSH_ERROR_INPUT: no ending or an unknown one (.blend, Alembic and USD are named); no triangles; vertices
+ * that are not finite; indices out of range; a damaged header or JSON; a file outside the model's folder
+ * (run->allow_outside);
+ * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for each of the file), nodes nested over 1024 deep;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error);
 VSH_API void vsh_model_free(vsh_model *model); /* NULL does nothing */
@@ -141,80 +163,147 @@ VSH_API void vsh_model_free(vsh_model *model); /* NULL does nothing */
 /* Number of meshes, at least 1; each has a triangle. */
 VSH_API size_t vsh_model_mesh_count(const vsh_model *model);
 
-/* Metres in one unit of the file, by which positions have been multiplied: 1 for glTF; 0 where the
- * format has no unit. */
+/* Metres in one unit of the file, which positions were multiplied by: 1 for glTF; 0 if the format has no
+ * unit. */
 VSH_API double vsh_model_unit(const vsh_model *model);
-
-/* Metres in a unit: "m", "cm", "mm", "in" or "ft"; 0 for what is none, and NULL. */
-VSH_API double vsh_unit(const char *name);
 
 /* Number of UV sets of mesh `index` (< mesh count), 0 … VSH_MAX_UV_SETS. */
 VSH_API int32_t vsh_model_uv_sets(const vsh_model *model, size_t index);
 
-/* A material of a file, as far as it decides where light comes through. What is of the texture is told
- * of masked and blended ones; light comes through masked ones where base_alpha × the texture's alpha <
- * alpha_cutoff. */
-typedef struct vsh_model_material {
-    const char *name;       /* NULL where it has none */
-    int32_t alpha;          /* VSH_ALPHA_… */
-    int32_t double_sided;   /* 1: both sides of its faces are seen */
-    double alpha_cutoff;    /* ≥ 0; 0 where it is not masked */
-    double base_alpha;      /* 0 … 1 */
-    int32_t uv_set;         /* of the texture, 0 … VSH_MAX_UV_SETS - 1; a mesh need not have it */
-    int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
-    double uv_transform[6]; /* rows (a, b, c), (d, e, f): the image is looked up at u' = a u + b v + c,
-                               v' = d u + e v + f, v up in all */
-    const void *image; /* the base colour's image file (PNG, JPEG, …) as it is in the model; NULL where it
-                          is a file of its own, or none */
-    size_t image_size; /* bytes of it */
-    const char *image_path; /* the file, within the model's folder unless run->allow_outside; it need not be
-                               there. NULL: none */
-    int32_t image_channel;  /* VSH_MASK_CHANNEL_… */
-    int32_t by_texture; /* 1: the format has no mode of alpha (OBJ): it is blended by base_alpha and the image
-                           alone, and as good as opaque where neither leaves anything out */
-} vsh_model_material;
+/* A view of mesh `index` (< mesh count) with the UVs of set `uv_set` (from 0). -1: the second set, else the
+ * first. If the set is missing, `uvs` is NULL. Arrays and names belong to the model. */
+VSH_API vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set);
 
-/* Number of materials of the file: of PLY 0. Of formats other than glTF and OBJ name and
- * `alpha` are told. */
-VSH_API size_t vsh_model_material_count(const vsh_model *model);
+/* --- heightfields */
 
-/* Material `index` (< material count). What it points to belongs to the model. */
-VSH_API vsh_model_material vsh_model_get_material(const vsh_model *model, size_t index);
+enum { VSH_MAX_HEIGHTS_SIDE = 65536 };
 
-/* The material of mesh `index` (< mesh count); -1: none. */
-VSH_API int32_t vsh_model_mesh_material(const vsh_model *model, size_t index);
+/* Heights on a regular grid, as a closed solid. A view. In local space y is up. Sample (row, column) is at x
+ * = size[0] (column / (columns - 1) - 1/2), z = size[1] (row / (rows - 1) - 1/2), y = height × value: row 0
+ * is at -z. Each cell is two triangles, cut from its least row and column to its greatest. Vertical sides
+ * reach down to a flat bottom, `base` below the lowest sample. */
+typedef struct vsh_heights_source {
+    const char *name;        /* for messages, such as a path; may be NULL */
+    int32_t columns;         /* along x, 2 … VSH_MAX_HEIGHTS_SIDE */
+    int32_t rows;            /* along z, likewise */
+    const float *values;     /* [rows][columns], finite */
+    double size[2];          /* along x and z, local units, 1e-12 … 1e12 */
+    double height;           /* of a value of 1, local units, -1e12 … 1e12; 0 is flat */
+    double base;             /* local units, > 0 … 1e12; 0: a twentieth of the longer size */
+    const double *transform; /* [12], local to world, as in vsh_mesh; NULL: identity */
+} vsh_heights_source;
 
-/* How a light of a file shines. */
+/* The part of a heightfield that becomes a mesh. */
 enum {
-    VSH_MODEL_LIGHT_DIRECTIONAL = 0, /* from far away: direction */
-    VSH_MODEL_LIGHT_POINT = 1,       /* position, range */
-    VSH_MODEL_LIGHT_SPOT = 2         /* position, direction, range, angles */
+    VSH_HEIGHTS_SOLID = 0,  /* the closed surface, without UVs: a caster */
+    VSH_HEIGHTS_SURFACE = 1 /* the top: a receiver. UVs are 0 … 1, u along x and v against z, so row 0 of a
+                               lightmap lies over row 0 of the heights. Normals are central differences */
 };
 
-/* A light that a file's node carries (glTF: KHR_lights_punctual). Lights of files have no size: shadows take
- * an angle or a radius of the caller's. */
-typedef struct vsh_model_light {
-    const char *name;    /* the node's, else the light's; NULL where neither has one */
-    int32_t type;        /* VSH_MODEL_LIGHT_… */
-    double position[3];  /* world, metres */
-    double direction[3]; /* world, of length 1: the way it shines, away from it; of a point 0, 0, 0 */
-    double color[3];     /* linear RGB, ≥ 0, without the intensity */
-    double intensity;    /* ≥ 0: lux, of a directional one at normal incidence; else candela */
-    double range;        /* metres, where it is said to end; 0: nowhere */
-    double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle; else 0 */
-    double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π / 2; else 0 */
-} vsh_model_light;
+/* Makes a model with one mesh. Free it with vsh_model_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: source, values or model NULL, sizes or `what` out of range, run;
+ * - VSH_ERROR_INPUT: a value that is not finite, before or after scaling, by its row and column;
+ * - VSH_ERROR_LIMIT: more than 2^32 - 1 vertices; run->memory_limit (36 bytes a sample for a solid, 56 for a
+ * surface);
+ * - VSH_ERROR_MEMORY. */
+VSH_API vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what, const vsh_run *run,
+                                          vsh_model **model, vsh_error *error);
 
-/* Number of lights of the file's scene: of glTF; of other formats 0. */
-VSH_API size_t vsh_model_light_count(const vsh_model *model);
+/* --- procedural signed distance fields
+ *
+ * A tree of shapes as an array of nodes. Shapes stand at the origin and operations combine earlier nodes.
+ * Then the node's scale, rotation and translation apply, in that order. Sources: I. Quilez, "distance
+ * functions" (2008 …), "exact SDF of a capped cone" (2018), "smooth minimum" (2013). */
 
-/* Light `index` (< light count), in the order in which its nodes are met. Its name belongs to the model. */
-VSH_API vsh_model_light vsh_model_get_light(const vsh_model *model, size_t index);
+enum {
+    VSH_SDF_SPHERE = 0,       /* radius */
+    VSH_SDF_BOX = 1,          /* size: half edges; grown by rounding on every side */
+    VSH_SDF_TORUS = 2,        /* around y: radius of the ring, minor_radius of the tube */
+    VSH_SDF_PLANE = 3,        /* slab with half edges size[0], size[2], size[1] thick, top at y = 0 */
+    VSH_SDF_CAPSULE = 4,      /* along y: half height size[1] of the core, radius */
+    VSH_SDF_CYLINDER = 5,     /* along y: half height size[1], radius */
+    VSH_SDF_CONE = 6,         /* along y: half height size[1], radius at -y, minor_radius at +y (0: a tip) */
+    VSH_SDF_UNION = 7,        /* left, right */
+    VSH_SDF_INTERSECTION = 8, /* left, right */
+    VSH_SDF_SUBTRACTION = 9,  /* left without right */
+    VSH_SDF_SMOOTH_UNION = 10 /* left, right, blended over a distance of `smoothing` */
+};
 
-/* A view of mesh `index` (< mesh count), with the UVs of set `uv_set` (from 0); -1 takes the second set where
- * there is one, else the first. Where the set is missing, `uvs` is NULL. The view's arrays and name belong to
- * the model. */
-VSH_API vsh_mesh vsh_model_mesh(const vsh_model *model, size_t index, int32_t uv_set);
+/* A node. Numbers are finite, lengths in world units before `scale`. Members that a shape does not name are
+ * ignored. */
+typedef struct vsh_sdf_node {
+    int32_t shape;         /* VSH_SDF_… */
+    int32_t left;          /* operations: index of the first operand, below this node's own */
+    int32_t right;         /* operations: index of the second operand, below this node's own */
+    double size[3];        /* > 0 */
+    double radius;         /* > 0 */
+    double minor_radius;   /* > 0; cone: ≥ 0 */
+    double rounding;       /* ≥ 0 */
+    double smoothing;      /* > 0 */
+    double scale;          /* > 0 */
+    double rotation[4];    /* quaternion x, y, z, w; any length but 0 */
+    double translation[3]; /* in the space of the operation that uses the node */
+} vsh_sdf_node;
+
+/* A unit sphere at the origin. */
+static inline vsh_sdf_node vsh_sdf_node_default(void) {
+    vsh_sdf_node node = {
+        VSH_SDF_SPHERE, -1, -1, {1.0, 1.0, 1.0}, 1.0, 0.25, 0.0, 0.1, 1.0, {0.0, 0.0, 0.0, 1.0},
+        {0.0, 0.0, 0.0}};
+    return node;
+}
+
+/* A tree. A view. The last node is the root; every other node is the operand of exactly one operation. No
+ * path from the root is longer than 2048 nodes. */
+typedef struct vsh_sdf {
+    const vsh_sdf_node *nodes; /* [node_count] */
+    size_t node_count;         /* 1 … 65536 */
+} vsh_sdf;
+
+/* --- outlines: areas of a plane, for extruded casters and flat scenes */
+
+/* An area of the xy-plane, x to the right, y up, world units. Immutable; threads may share it. */
+typedef struct vsh_outline vsh_outline;
+
+/* How an image becomes an outline. */
+typedef struct vsh_mask_options {
+    size_t struct_size;
+    double width;        /* of the image, world units, > 0 … 1e15 */
+    double height;       /* likewise; 0: by the image's proportions, with square pixels */
+    double threshold;    /* values from here on are solid; finite. 0.5: half of an integer format's range */
+    const char *channel; /* "alpha", "luminance" (Rec. 709), "red", "green", "blue", or a channel's name;
+                            NULL: alpha if it is below 1 anywhere, else luminance */
+    int32_t invert;      /* nonzero: values below the threshold are solid */
+} vsh_mask_options;
+
+static inline vsh_mask_options vsh_mask_options_default(void) {
+    vsh_mask_options options = {sizeof(vsh_mask_options), 1.0, 0.0, 0.5, NULL, 0};
+    return options;
+}
+
+enum { VSH_ALIGN_LEFT = 0, VSH_ALIGN_CENTER = 1, VSH_ALIGN_RIGHT = 2 };
+
+/* How text becomes an outline. */
+typedef struct vsh_text_options {
+    size_t struct_size;
+    double height;       /* of the font's em, world units, > 0 … 1e15; capitals are about 0.7 of it */
+    double line_spacing; /* between baselines, as a multiple of the font's own, > 0 … 1e3 */
+    int32_t align;       /* VSH_ALIGN_…: where lines lie relative to x = 0 */
+} vsh_text_options;
+
+static inline vsh_text_options vsh_text_options_default(void) {
+    vsh_text_options options = {sizeof(vsh_text_options), 1.0, 1.0, VSH_ALIGN_LEFT};
+    return options;
+}
+
+/* Makes the area that closed polygons wind around, by the nonzero rule: a polygon inside another that runs
+ * the other way is a hole. `points` [sum of counts][2], world units, at most 1e15 in size; `counts`
+ * [contour_count]. Contours may cross each other and themselves. Errors: VSH_ERROR_ARGUMENT (an array or
+ * outline NULL, run), VSH_ERROR_INPUT (a point out of range, no area), VSH_ERROR_LIMIT (run->memory_limit,
+ * more than 2^31 points), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts, size_t contour_count,
+                                             const vsh_run *run, vsh_outline **outline, vsh_error *error);
+VSH_API void vsh_outline_free(vsh_outline *outline); /* NULL does nothing */
 
 #ifdef __cplusplus
 }

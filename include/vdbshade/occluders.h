@@ -1,108 +1,130 @@
-/* What casts, as one handle: points, lightmaps, volumes, pictures and distances are asked of it. */
+/* Occluders: everything that casts, as one handle. Points, lightmaps, volumes and pictures are shaded against
+ * it.
+ *
+ *     vsh_occluders *occluders;
+ *     vsh_occluders_options options = vsh_occluders_options_default();
+ *     options.grid.resolution = 256; // voxels too, for methods that march and for distances
+ *     vsh_occluders_create(meshes, mesh_count, &options, &run, &occluders, &error);
+ *     double point[3] = {0.0, 1.0, 0.0};
+ *     float distance;
+ *     vsh_field_sample(vsh_occluders_get_field(occluders, NULL), 1, point, &distance);
+ *     vsh_occluders_free(occluders);
+ *
+ * vsh_scene_occluders() makes them of a scene, with layers, heightfields and spheres. */
 #ifndef VDBSHADE_OCCLUDERS_H
 #define VDBSHADE_OCCLUDERS_H
 
-#include "field.h"
-#include "layer.h"
-#include "trace.h"
+#include "grid.h"
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* A field, triangles for exact methods, layers beside them, and what errors are measured against. Immutable;
- * may be shared by threads. Made from meshes or a level set here, from parts of the caller's own, or from a
- * scene (vsh_scene_occluders()). Free it with vsh_occluders_free(). */
+/* The triangles and voxels of all casters. Immutable; threads may share it. Free it with
+ * vsh_occluders_free(). */
 typedef struct vsh_occluders vsh_occluders;
 
-/* How occluders are made of meshes. */
+/* How occluders are made. */
 typedef struct vsh_occluders_options {
     size_t struct_size;
-    double reach;          /* as in vsh_field_options */
-    int32_t triangles;     /* nonzero: keep the triangles where the library has Embree: exact methods can then
-                              be asked for, auto is exact, and errors are measured against them. 0: voxels
-                              alone, some 100 bytes less a triangle */
-    vsh_grid_options grid; /* of the voxels. A resolution and a voxel size of 0: none where triangles are
-                              kept, so that only auto and exact can be asked for, and no distances; else a
-                              resolution of 256 */
+    double reach; /* largest distance from a surface that the voxels must resolve, world units: the tangent of
+                     the widest light's half angle times the longest ray, or the AO distance. 0: four times
+                     the diagonal of the casters' box */
+    double grown; /* voxels that casters are grown by for rays, 0 … 1 (0.15). A trilinear sample over a convex
+                     edge is too large, so voxelized casters seem smaller than they are. 0: the voxels define
+                     the caster */
+    int32_t triangles; /* nonzero: keep the triangles if the library has Embree. Then methods can be exact,
+                          auto is exact, and bakes can measure their error. 0: voxels alone, about 100 bytes
+                          less for each triangle */
+    vsh_grid_options grid; /* of the voxels. Without a resolution and a voxel size there are no voxels if
+                              triangles are kept: methods are auto or exact, and distances are unknown.
+                              Otherwise the resolution is 256 */
 } vsh_occluders_options;
 
 static inline vsh_occluders_options vsh_occluders_options_default(void) {
-    vsh_occluders_options options = {sizeof(vsh_occluders_options), 0.0, 1, vsh_grid_options_default()};
+    vsh_occluders_options options = {sizeof(vsh_occluders_options), 0.0, 0.15, 1, vsh_grid_options_default()};
     options.grid.resolution = 0;
     return options;
 }
 
-/* Meshes as what casts: their triangles kept, and where voxels are asked for, voxelised and a field made of
- * them. The meshes need not outlive the call. Errors:
+/* Makes occluders of meshes, which need not outlive the call. Errors:
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
- * - VSH_ERROR_INPUT, VSH_ERROR_LIMIT: as vsh_grid_from_meshes(), vsh_field_create() and
- *   vsh_triangles_create();
+ * - VSH_ERROR_UNSUPPORTED: Embree cannot be loaded;
+ * - VSH_ERROR_INPUT, VSH_ERROR_LIMIT: as vsh_grid_from_meshes();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
                                         const vsh_occluders_options *options, const vsh_run *run,
                                         vsh_occluders **occluders, vsh_error *error);
 
-/* A level set as what casts: that of a .vdb file, a callback or a procedural tree, or a union of them
- * (grid.h). NULL options stand for their default. The grid need not outlive the call. Errors: as
- * vsh_field_create(). */
-VSH_API vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_field_options *options,
+/* Makes occluders of a level set, which need not outlive the call. Of the options, `reach` and `grown` apply.
+ * Time and memory follow the area of the surface. Errors:
+ * - VSH_ERROR_ARGUMENT: options out of range, run;
+ * - VSH_ERROR_INPUT: a grid without a surface;
+ * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^31 blocks or 2.9 million bricks of 8³ voxels;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+VSH_API vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_occluders_options *options,
                                            const vsh_run *run, vsh_occluders **occluders, vsh_error *error);
-
-/* What a handle is made of, for casters that are in none of these: heights, spheres, groups that are shaded
- * each in its own way, a field with triangles of another shape. A view; nothing is owned. */
-typedef struct vsh_occluder_parts {
-    size_t struct_size;
-    const vsh_field *field; /* casters in no layer; NULL: they are known by their triangles alone, which auto
-                               and exact trace, or all casters are in layers */
-    const vsh_triangles *triangles; /* of the same casters, for exact methods; NULL: none */
-    const vsh_layer
-        *layers;        /* [layer_count]: casters beside those; may be NULL. Each has the same struct_size */
-    size_t layer_count; /* 0 … VSH_MAX_LAYERS */
-    const vsh_triangles *true_triangles; /* these two: the casters themselves, which stand for the truth where
-                                            a bake is asked for its errors (vsh_bake_stats). Together they are
-                                            all casters; not with layers. Both NULL: nothing is measured */
-    const vsh_solids *true_solids;
-    double voxel_size; /* what start offsets are measured in where there is no field, world units, 1e-12 …
-                        * 1e12; 0: 1/96 of the triangles' longest side, else that of the finest layer's field,
-                        * or 1e-5 of the first layer's longest side */
-} vsh_occluder_parts;
-
-static inline vsh_occluder_parts vsh_occluder_parts_default(void) {
-    vsh_occluder_parts parts = {sizeof(vsh_occluder_parts), NULL, NULL, NULL, 0, NULL, NULL, 0.0};
-    return parts;
-}
-
-/* Parts as what casts. The layers are copied; what they and the parts refer to must outlive the handle.
- * Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more layers than
- * VSH_MAX_LAYERS; a layer that is out of range, its number and member in the message), VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_occluders_from_parts(const vsh_occluder_parts *parts, vsh_occluders **occluders,
-                                            vsh_error *error);
 VSH_API void vsh_occluders_free(vsh_occluders *occluders); /* NULL does nothing */
 
-/* What a handle is made of: views into it. `field` is never NULL; it holds nothing where all casters are in
- * layers, and knows no distances (NaN) of casters without voxels. Cannot fail. */
-VSH_API void vsh_occluders_get_parts(const vsh_occluders *occluders, vsh_occluder_parts *parts);
-
-/* What occluders come to. */
+/* Size and cost of occluders. */
 typedef struct vsh_occluders_info {
-    double voxel_size;        /* of the first field, world units: that of casters in no layer where there are
-                                 such; 0: nothing is voxelised */
-    int32_t levels;           /* of the same */
-    size_t layer_count;       /* those that have casters */
+    double voxel_size;  /* world units, of the casters in no layer, else of the first layer; 0: no voxels */
+    int32_t levels;     /* of that pyramid */
+    size_t layer_count; /* layers that have casters */
     uint64_t active_voxels;   /* of all level sets */
-    uint64_t grid_bytes;      /* of the same, in memory while they were there; 0 of parts */
-    uint64_t bricks;          /* these two of all fields */
-    uint64_t field_bytes;     /* in memory */
-    uint64_t triangles_bytes; /* in memory, the true ones too */
-    int32_t has_triangles;    /* 1: of casters in no layer; auto is exact for them */
-    double voxelize_s;        /* seconds that these took to make; 0 of parts */
-    double field_s;           /* the same, of the field */
-    double triangles_s;       /* the same, of what rays are traced in */
+    uint64_t grid_bytes;      /* memory that these took while occluders were made */
+    uint64_t bricks;          /* of 8³ cells, of all fields */
+    uint64_t field_bytes;     /* memory of all fields */
+    uint64_t triangles_bytes; /* memory of triangles and their trees */
+    int32_t has_triangles;    /* 1: casters in no layer have triangles, so auto is exact for them */
+    double voxelize_s;        /* seconds to make the level sets */
+    double field_s;           /* seconds to make the fields */
+    double triangles_s;       /* seconds to make the trees of triangles */
 } vsh_occluders_info;
 
-/* Cannot fail. */
+/* Fills *info. Cannot fail. */
 VSH_API void vsh_occluders_get_info(const vsh_occluders *occluders, vsh_occluders_info *info);
+
+/* How the visibility of a scene's layer is combined with that of the others. */
+enum {
+    VSH_COMBINE_MULTIPLY = 0, /* product: layers hide independent parts of a light */
+    VSH_COMBINE_MIN = 1       /* minimum: layers hide the same part of it */
+};
+
+/* --- the field: a pyramid of narrow bands that shadows are marched through
+ *
+ * Levels have voxels of 1, 2, 4, … times the size, and each has its own band. */
+
+/* Belongs to its occluders. */
+typedef struct vsh_field vsh_field;
+
+/* The field of the casters in no layer (`layer` NULL), or in the scene's layer of that name. NULL if that
+ * layer has no voxels. The field of casters that are only traced has no distances: they are NaN. Cannot fail.
+ */
+VSH_API const vsh_field *vsh_occluders_get_field(const vsh_occluders *occluders, const char *layer);
+
+/* Writes signed distances, world units, negative inside, at `count` world positions [count][3] to
+ * distances[count]. Within the finest band they are trilinear samples of the level set. Beyond it they never
+ * exceed the true distance, so that rays can step by them; within the reach they are 0.7 to 0.95 of it. NaN
+ * for positions that are not finite. Runs on the calling thread. */
+VSH_API void vsh_field_sample(const vsh_field *field, size_t count, const double *positions,
+                              float *distances);
+
+/* Size of a field. */
+typedef struct vsh_field_info {
+    double voxel_size;      /* of the finest level, world units */
+    double reach;           /* distance that the coarsest level resolves, world units */
+    double bounds_min[3];   /* world box of the casters */
+    double bounds_max[3];   /* the other corner */
+    double shell_thickness; /* of sheets, world units; 0: there are none */
+    int32_t levels;         /* of the pyramid, with the finest */
+    uint64_t bricks;        /* of 8³ cells, over all levels */
+    uint64_t bytes;         /* in memory */
+    uint64_t active_voxels; /* of the level set that it was made of */
+} vsh_field_info;
+
+/* Fills *info. Cannot fail. */
+VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
 
 #ifdef __cplusplus
 }

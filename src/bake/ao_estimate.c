@@ -1,17 +1,14 @@
-/* Estimates of texels by what they and those around them shot. */
+/* Estimates AO of texels from their shots and their neighbours' shots. */
 #include "bake/page.h"
 
-#include "bake/raster.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "shade/ao.h"
-#include "shade/window.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Cells of a lattice that are estimated together, with those around them that their windows reach. */
+/* Cells of a lattice that are estimated together, with the cells around that their windows reach. */
 enum { TILES = 8, INNER = TILES * VSHI_CELL, WIDTH = INNER + 2 * VSHI_CELL, TEXELS = WIDTH * WIDTH };
 _Static_assert((int)VSHI_WINDOW_REACH <= (int)VSHI_CELL, "windows reach the next tile, no farther");
 
@@ -29,7 +26,7 @@ typedef struct estimating {
     const vsh_shade_options *shade;
     float *values, *bent;
     vshi_ao_plane *planes;
-    int32_t spacing; /* of the lattice at work */
+    int32_t spacing; /* of the current lattice */
     row_sum *sums;   /* [rows of cells] */
 } estimating;
 
@@ -48,7 +45,7 @@ static bool is_own(const estimating *s, size_t at) {
     return at > 0 && s->shots->rays[at - 1] > 0 && s->shots->level[at - 1] == s->spacing;
 }
 
-/* False where no texel within is to be estimated. */
+/* Lists the texels of a block. False if none is to be estimated. */
 static bool find_texels(const estimating *s, block *b) {
     bool any = false;
     for (int32_t k = 0; k < TEXELS; ++k) {
@@ -81,7 +78,7 @@ static void lay_out(const estimating *s, block *b) {
         b->texels[k].spread = spread;
     }
     vshi_links_find(&s->map, &b->lattice, b->texels);
-    for (size_t k = 0; k < TEXELS; ++k) { /* what shot nothing parts those beside it */
+    for (size_t k = 0; k < TEXELS; ++k) { /* a texel without rays cuts the links of its neighbours */
         const bool none = b->at[k] == 0;
         b->texels[k].left = b->texels[k].left && !none && b->at[k - 1] > 0;
         b->texels[k].above = b->texels[k].above && !none && b->at[k - WIDTH] > 0;
@@ -89,8 +86,8 @@ static void lay_out(const estimating *s, block *b) {
     vshi_windows_sum(&b->windows);
 }
 
-/* Bent normals turn with the surface, and windows are chosen by values, which may not change where it turns:
- * what is averaged is how far each is from its own texel's normal. */
+/* Bent normals turn with the surface, but windows are chosen by values, which may not change there. So the
+ * average is over the differences from each texel's normal. */
 static void bend(const estimating *s, const block *b, const vshi_window_estimate *e, int32_t x, int32_t y,
                  float *bent) {
     const float *own = s->map.normal + 3 * (b->at[y * WIDTH + x] - 1);
@@ -114,7 +111,8 @@ static void bend(const estimating *s, const block *b, const vshi_window_estimate
     }
 }
 
-/* By windows across tiles; where these know less than was enough for the texel's tile, by the tile's own. */
+/* Estimates by windows across tiles. If these know too little for the texel's tile, by the tile's own
+ * windows. */
 static vshi_window_estimate estimate(const estimating *s, const block *b, int32_t x, int32_t y) {
     const double max_error = s->shade->max_error;
     const vshi_window_estimate e = vshi_windows_estimate(&b->windows, x, y, max_error, 0);
@@ -174,12 +172,12 @@ static vsh_result estimate_block(void *user, size_t number, vsh_error *error) {
 /* A cell whose texels are estimated by the windows of its corners. */
 typedef struct cell {
     int32_t at[2];
-    uint32_t good;    /* corners that are of the lattice, as bits */
+    uint32_t good;    /* corners that belong to the lattice, as bits */
     size_t corner[4]; /* origins */
     bool whole;
 } cell;
 
-static void look_at(const estimating *s, cell *c) {
+static void read_corners(const estimating *s, cell *c) {
     c->good = 0;
     for (int32_t k = 0; k < 4; ++k) {
         const size_t at =
@@ -192,12 +190,12 @@ static void look_at(const estimating *s, cell *c) {
     c->whole = vshi_links_whole(&s->map, c->at[0], c->at[1], s->spacing);
 }
 
-/* Where a texel lies between its cell's corners, 0 … 1, but never on one's line. */
+/* The place of a texel between its cell's corners, 0 … 1, but never on a corner's line. */
 static double part_of(int32_t place, int32_t spacing) {
     return (place + 0.25) / (spacing + 0.5);
 }
 
-/* The planes of the corners, blended. */
+/* Blends the planes of the corners. */
 static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t dy, size_t i) {
     const uint32_t corners =
         c->good & vshi_ao_corners(&s->map, c->at, s->spacing, c->whole, c->at[0] + dx, c->at[1] + dy);
@@ -222,7 +220,7 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
                                                                    (double)s->map.normal[3 * corner + axis]);
         }
     }
-    if (!(sum > 0.0)) { /* the part is damaged */
+    if (!(sum > 0.0)) { /* a damaged part of a bake */
         s->values[i] = 0.0f;
         return;
     }
@@ -235,42 +233,40 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
     }
 }
 
-/* The texels between of a cell from (column, row) on. */
-static void fill_cell(const estimating *s, int32_t column, int32_t row) {
-    const int32_t right = column + s->spacing, bottom = row + s->spacing;
-    cell c = {.at = {column, row}};
-    bool looked = false;
-    for (int32_t y = row; y < bottom && y < s->map.height; ++y) {
-        for (int32_t x = column; x < right && x < s->map.width; ++x) {
-            const size_t i = (size_t)y * (size_t)s->map.width + (size_t)x;
-            if (s->shots->level[i] != s->spacing || s->shots->rays[i] > 0) {
-                continue;
-            }
-            if (!looked) {
-                look_at(s, &c);
-                looked = true;
-            }
-            fill_texel(s, &c, x - column, y - row, i);
-        }
-    }
-}
-
-/* A vshi_range_fn over rows of cells. */
-static void fill_cells(void *user, size_t begin, size_t end) {
+/* Fills the texels between of a row of cells. A vshi_element_fn. */
+static vsh_result fill_row(void *user, size_t number, vsh_error *error) {
     const estimating *s = user;
-    for (size_t row = begin; row < end; ++row) {
-        for (int32_t column = 0; column < s->map.width; column += s->spacing) {
-            fill_cell(s, column, (int32_t)row * s->spacing);
+    const int32_t row = (int32_t)number * s->spacing, bottom = row + s->spacing;
+    (void)error;
+    for (int32_t column = 0; column < s->map.width; column += s->spacing) {
+        cell c = {.at = {column, row}};
+        bool read = false;
+        for (int32_t y = row; y < bottom && y < s->map.height; ++y) {
+            for (int32_t x = column; x < column + s->spacing && x < s->map.width; ++x) {
+                const size_t i = (size_t)y * (size_t)s->map.width + (size_t)x;
+                if (s->shots->level[i] != s->spacing || s->shots->rays[i] > 0) {
+                    continue;
+                }
+                if (!read) {
+                    read_corners(s, &c);
+                    read = true;
+                }
+                fill_texel(s, &c, x - column, y - row, i);
+            }
         }
     }
+    return VSH_OK;
 }
 
 /* --- all */
 
-/* Sums a row of cells for the statistics. */
-static void sum_row(const estimating *s, size_t row, row_sum *sum) {
+/* Sums a row of cells for the statistics. A vshi_element_fn. */
+static vsh_result sum_row(void *user, size_t row, vsh_error *error) {
+    const estimating *s = user;
+    row_sum *sum = &s->sums[row];
     const size_t width = (size_t)s->map.width, end = (row + 1) * VSHI_CELL * width;
     const size_t all = width * (size_t)s->map.height;
+    (void)error;
     for (size_t i = row * VSHI_CELL * width; i < end && i < all; ++i) {
         if (s->shots->level[i] == VSHI_AO_KNOWN_LEVEL) {
             const float value = s->shots->share[i];
@@ -289,16 +285,10 @@ static void sum_row(const estimating *s, size_t row, row_sum *sum) {
             ++sum->refined;
         }
     }
+    return VSH_OK;
 }
 
-static void sum_rows(void *user, size_t begin, size_t end) {
-    estimating *s = user;
-    for (size_t row = begin; row < end; ++row) {
-        sum_row(s, row, &s->sums[row]);
-    }
-}
-
-/* Curvature is summed by rows of cells: single texels are too noisy to tell it from zero. */
+/* Sums curvature by rows of cells: for single texels it is too noisy to differ from zero. */
 static void add_sums(const estimating *s, size_t rows, vsh_shade_stats *stats) {
     double square = 0.0;
     for (size_t row = 0; row < rows; ++row) {
@@ -322,10 +312,10 @@ static vsh_result run_estimate(estimating *s, int32_t spacing, vshi_job *job, vs
     }
     for (s->spacing = spacing; s->spacing > 1; s->spacing /= 2) {
         const size_t cells = (size_t)((height + s->spacing - 1) / s->spacing);
-        VSHI_TRY(vshi_parallel_for(job, cells, 1, 0, fill_cells, s, error));
+        VSHI_TRY(vshi_parallel_each(job, cells, 1, 0, fill_row, s, error));
     }
     const size_t rows = ((size_t)height + VSHI_CELL - 1) / VSHI_CELL;
-    return vshi_parallel_for(job, rows, 1, 1, sum_rows, s, error);
+    return vshi_parallel_each(job, rows, 1, 1, sum_row, s, error);
 }
 
 vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, float *values,
@@ -342,10 +332,8 @@ vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, floa
                     .values = values,
                     .planes = planes,
                     .bent = bent};
-    vshi_job *job = vshi_job_begin(run, "ao", rows);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory");
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(run, "ao", rows, &job, error));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.sums, rows, sizeof *s.sums, "AO texels", error));
     VSHI_TRY_DONE(run_estimate(&s, page->charts->ao_spacing, job, error));

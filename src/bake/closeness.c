@@ -1,16 +1,17 @@
 /* Charts that lie closer to each other than a texel. Their borders are walked in steps of half a texel and
  * put into the texels they pass, so that near ones are found there. */
+#include "bake/texels.h"
+#include "base/bytes.h"
 #include "base/floats.h"
-#include "base/hash.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "mesh/edges.h"
 #include "mesh/mesh.h"
-#include "mesh/weld.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <vdbshade/bake.h>
+#include <vdbshade/lightmap.h>
 
 static const double STEP = 0.5; /* texels */
 
@@ -20,17 +21,17 @@ static const char what[] = "closeness of charts";
 
 /* --- borders of charts */
 
-/* An edge that a triangle of some area in the UVs has to itself. */
+/* An edge with a single triangle of some area in the UVs. */
 typedef struct border {
     double x[2], y[2]; /* texels */
-    uint32_t chart;    /* first a triangle of it */
+    uint32_t chart;    /* a triangle of it, until charts are found */
     uint32_t mesh;
 } border;
 
-/* A border in a texel. */
+/* A border that passes a texel. */
 typedef struct passing {
     uint64_t texel;
-    uint32_t border, next; /* of the same place in the table; NONE: none */
+    uint32_t border, next; /* next in the same list of the table; NONE: none */
 } passing;
 
 typedef struct closeness {
@@ -46,14 +47,14 @@ typedef struct closeness {
     size_t passing_count, head_count;
 } closeness;
 
-/* Whether memory allows for `bytes` more than the charts and borders take. */
+/* Checks that memory allows `bytes` more than the charts and borders. */
 static vsh_result check_bytes(const closeness *c, double bytes, vsh_error *error) {
     const double held =
         (double)c->triangles * sizeof *c->charts + (double)c->border_room * sizeof *c->borders;
     return vshi_check_limit(c->run, held + bytes, what, error);
 }
 
-/* Vertices are one where their places in space and in the UVs are equal. */
+/* Vertices with equal places in space and in the UVs are one. */
 static void key_of(const void *user, size_t vertex, uint64_t key[VSHI_KEY_WORDS]) {
     const vsh_mesh *mesh = user;
     float values[2 * VSHI_KEY_WORDS] = {0.0f};
@@ -65,7 +66,7 @@ static void key_of(const void *user, size_t vertex, uint64_t key[VSHI_KEY_WORDS]
     memcpy(key, values, sizeof values);
 }
 
-/* Whether a triangle covers anything in the UVs. */
+/* Whether a triangle covers nothing in the UVs. */
 static bool is_flat(const vsh_mesh *mesh, size_t local) {
     const uint32_t *index = mesh->indices + 3 * local;
     const float *a = mesh->uvs + 2 * (size_t)index[0], *b = mesh->uvs + 2 * (size_t)index[1];
@@ -93,7 +94,7 @@ static vsh_result add_border(closeness *c, size_t m, uint32_t side, uint32_t tri
     return VSH_OK;
 }
 
-/* Joins the charts on all sides of an edge, and lists edges that have one. `first`: triangle of the mesh. */
+/* Joins the charts on all sides of an edge, and lists edges with one side. `first`: triangle of the mesh. */
 static vsh_result join_charts(closeness *c, size_t m, uint32_t first, vsh_error *error) {
     const vsh_mesh *mesh = &c->meshes[m];
     const size_t triangles = mesh->triangle_count, vertices = mesh->vertex_count;
@@ -103,8 +104,8 @@ static vsh_result join_charts(closeness *c, size_t m, uint32_t first, vsh_error 
     /* welding takes four slots a vertex at most, sorting one count a vertex and two numbers a side */
     VSHI_TRY_DONE(check_bytes(
         c, (double)vertices * 6.0 * sizeof *weld + 9.0 * (double)triangles * sizeof *corners, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&weld, vertices, sizeof *weld, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&corners, triangles, 3 * sizeof *corners, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(weld, vertices), VSHI_ARRAY(corners, 3 * triangles)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
     VSHI_TRY_DONE(vshi_weld(vertices, key_of, mesh, weld, error));
     for (size_t side = 0; side < 3 * triangles; ++side) {
         corners[side] = weld[mesh->indices[side]];
@@ -148,16 +149,6 @@ static vsh_result find_borders(closeness *c, vsh_error *error) {
     return VSH_OK;
 }
 
-/* --- how near they come */
-
-static size_t power_above(size_t count) {
-    size_t power = 16;
-    while (power < count) {
-        power *= 2;
-    }
-    return power;
-}
-
 /* Steps along a border. */
 static size_t steps_of(const border *b) {
     const double length =
@@ -171,7 +162,7 @@ static void step_to(const border *b, size_t step, size_t steps, double *x, doubl
     *y = b->y[0] + t * (b->y[1] - b->y[0]);
 }
 
-/* Of a place within the image; false outside. */
+/* Finds the texel of a place. False outside the image. */
 static bool texel_at(const closeness *c, double x, double y, uint64_t *texel) {
     if (!(x >= 0.0 && x < c->width && y >= 0.0 && y < c->height)) {
         return false;
@@ -180,12 +171,12 @@ static bool texel_at(const closeness *c, double x, double y, uint64_t *texel) {
     return true;
 }
 
-/* Where a texel's list begins: neighbours along a row are mostly near each other in memory. */
+/* The head of a texel's list. Neighbours along a row are mostly close in memory. */
 static uint32_t *head_of(const closeness *c, uint64_t texel) {
     return &c->heads[(vshi_mix(texel / 16) * 16 + texel % 16) & (c->head_count - 1)];
 }
 
-static void put_borders(closeness *c) {
+static void list_passings(closeness *c) {
     memset(c->heads, 0xff, c->head_count * sizeof *c->heads);
     for (uint32_t b = 0; b < c->border_count; ++b) {
         const size_t steps = steps_of(&c->borders[b]);
@@ -212,11 +203,9 @@ static double distance_to(const border *b, double x, double y) {
     return sqrt(px * px + py * py);
 }
 
-/* How near another chart's border is to a place; 1 where none is within a texel. *alone: none passes the
- * texels around it, wherever in its own the place is. */
-static double nearest_other(const closeness *c, uint32_t chart, double x, double y, bool *alone) {
+/* Distance to the nearest border of another chart, at most 1 texel. */
+static double nearest_other(const closeness *c, uint32_t chart, double x, double y) {
     double nearest = 1.0;
-    *alone = true;
     for (int dy = -1; dy <= 1; ++dy) {
         for (int dx = -1; dx <= 1; ++dx) {
             uint64_t texel;
@@ -227,7 +216,6 @@ static double nearest_other(const closeness *c, uint32_t chart, double x, double
                 const border *b = &c->borders[c->passings[p].border];
                 if (c->passings[p].texel == texel && b->chart != chart) {
                     nearest = fmin(nearest, distance_to(b, x, y));
-                    *alone = false;
                 }
             }
         }
@@ -235,9 +223,7 @@ static double nearest_other(const closeness *c, uint32_t chart, double x, double
     return nearest;
 }
 
-static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found) {
-    uint64_t free_texel = UINT64_MAX; /* around which no other chart than free_chart is */
-    uint32_t free_chart = 0;
+static void measure(const closeness *c, uint64_t *by_mesh, vshi_closeness *found) {
     for (uint32_t b = 0; b < c->border_count; ++b) {
         const border *own = &c->borders[b];
         const size_t steps = steps_of(own);
@@ -246,15 +232,7 @@ static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found)
             double x, y;
             uint64_t texel;
             step_to(own, s, steps, &x, &y);
-            if (!texel_at(c, x, y, &texel) || (texel == free_texel && own->chart == free_chart)) {
-                continue;
-            }
-            bool alone;
-            const double gap = nearest_other(c, own->chart, x, y, &alone);
-            if (alone) {
-                free_texel = texel;
-                free_chart = own->chart;
-            }
+            const double gap = texel_at(c, x, y, &texel) ? nearest_other(c, own->chart, x, y) : 1.0;
             if (gap < 1.0) {
                 found->gap = fmin(found->gap, gap);
                 found->texels += texel != last;
@@ -271,7 +249,7 @@ static void measure(const closeness *c, uint64_t *by_mesh, vsh_closeness *found)
     }
 }
 
-static vsh_result find(closeness *c, vsh_closeness *found, vsh_error *error) {
+static vsh_result find(closeness *c, vshi_closeness *found, vsh_error *error) {
     uint64_t *by_mesh = NULL;
     size_t most = 0;
     vsh_result result;
@@ -280,13 +258,14 @@ static vsh_result find(closeness *c, vsh_closeness *found, vsh_error *error) {
     for (size_t b = 0; b < c->border_count; ++b) {
         most += steps_of(&c->borders[b]) + 1;
     }
-    c->head_count = power_above(most);
+    for (c->head_count = 16; c->head_count < most; c->head_count *= 2) {
+    }
     if (most < NONE) {
         VSHI_TRY_DONE(check_bytes(
             c, (double)most * sizeof *c->passings + (double)c->head_count * sizeof *c->heads, error));
-        VSHI_TRY_DONE(vshi_allocate((void **)&c->passings, most, sizeof *c->passings, what, error));
-        VSHI_TRY_DONE(vshi_allocate((void **)&c->heads, c->head_count, sizeof *c->heads, what, error));
-        put_borders(c);
+        const vshi_array arrays[] = {VSHI_ARRAY(c->passings, most), VSHI_ARRAY(c->heads, c->head_count)};
+        VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+        list_passings(c);
         measure(c, by_mesh, found);
     }
 done:
@@ -298,8 +277,8 @@ done:
     return result;
 }
 
-vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
-                                const vsh_run *run, vsh_closeness *found, vsh_error *error) {
+vsh_result vshi_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
+                                 const vsh_run *run, vshi_closeness *found, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS_OF(mesh_count, meshes);
     VSHI_NEEDS(found);
@@ -323,7 +302,7 @@ vsh_result vsh_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32
         return vshi_fail(error, VSH_ERROR_LIMIT, "closeness of charts: %zu triangles, at most %u",
                          c.triangles, UINT32_MAX / 3 - 1);
     }
-    vsh_closeness all = {.gap = 1.0};
+    vshi_closeness all = {.gap = 1.0};
     const vsh_result result = find(&c, &all, error);
     *found = all;
     return result;

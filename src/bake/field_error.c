@@ -1,38 +1,30 @@
-/* Values that rays marched through a field gave are off by what the rays leave, which their spread tells, and
- * by what the field's voxels make of the casters, which nothing in the field tells. So some of the samples
- * are held against rays to the casters themselves, stratified over each tile, so that every part of it counts
- * as much as it is large. Each has two values by rays, independent of each other: the product of both
- * differences is the squared error on average, without the rays' own noise in it. */
-#include "bake/field_error.h"
+/* Errors of values, measured against the casters. Marched values have the error of their rays, which the
+ * rays' spread shows, and the error of the field's voxels, which nothing in the field shows. So some samples
+ * are compared with rays to the casters. They are stratified over each tile, so that each part counts by its
+ * size. Each sample gets two independent values by rays. The product of both differences is the squared error
+ * on average, without the rays' own noise. */
+#include "bake/page.h"
 
-#include "base/hash.h"
+#include "base/bytes.h"
 #include "shade/ao.h"
-#include "shade/inside.h"
+#include "shade/shade.h"
 #include "trace/embree.h"
 
 #include <math.h>
 
-/* One sample in so many, which costs a few hundredths of shading them all, but not so few that a small
- * lightmap's error stays unknown. Where rays met the casters anyway, what is off is less and costs less. */
+/* One sample in ONE_IN costs a few hundredths of all shading. Small lightmaps compare more. Where rays met
+ * the casters anyway, the error is less and fewer samples are enough. */
 enum { ONE_IN = 16, ONE_TRACED_IN = 64, MOST = 16384, MOST_TRACED = 4096, LEAST = 4096, LEAST_TRACED = 1024 };
-/* Rays of a sample in doubt, each of both times: their noise, over all samples, is then a tenth of the error
- * that is asked for, and less. */
+/* Rays of each of the two values of a sample in doubt. Over all samples their noise is at most a tenth of the
+ * error asked for. */
 enum { RAYS = 64, FINE_RAYS = 256 };
 static const double FINE = 0.01;
-/* Sums are of multiples of this, so that no order shows in their bits. */
+/* Sums are multiples of this, so that their order does not show. */
 static const double UNIT = 0x1p-32;
-
-static size_t step_of(uint64_t samples, bool traced) {
-    const uint64_t wanted = samples / (traced ? ONE_TRACED_IN : ONE_IN),
-                   least = traced ? LEAST_TRACED : LEAST;
-    const uint64_t most = traced ? MOST_TRACED : MOST;
-    const uint64_t count = wanted < least ? least : wanted > most ? most : wanted;
-    return samples > 0 ? (size_t)((samples + count - 1) / count) : 1;
-}
 
 static vshi_truth truth_of(const vsh_occluders *occluders, const vsh_shade_options *shade) {
     const vsh_field *field = occluders->field;
-    static const double LIFT = 0x1p-18; /* of the casters' size, where no triangles say it */
+    static const double LIFT = 0x1p-18; /* share of the casters' size, without triangles */
     double size = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         size = fmax(size, field->world_max[axis] - field->world_min[axis]);
@@ -46,10 +38,14 @@ static vshi_truth truth_of(const vsh_occluders *occluders, const vsh_shade_optio
 
 vshi_field_error vshi_field_error_open(const vsh_occluders *occluders, const vsh_shade_options *shade,
                                        uint64_t samples, bool traced) {
-    return (vshi_field_error){occluders, truth_of(occluders, shade), traced, step_of(samples, traced)};
+    const uint64_t least = traced ? LEAST_TRACED : LEAST, most = traced ? MOST_TRACED : MOST;
+    const uint64_t wanted = samples / (traced ? ONE_TRACED_IN : ONE_IN);
+    const uint64_t count = wanted < least ? least : wanted > most ? most : wanted;
+    const size_t step = samples > 0 ? (size_t)((samples + count - 1) / count) : 1;
+    return (vshi_field_error){occluders, truth_of(occluders, shade), traced, step, NULL};
 }
 
-/* Whether the casters leave it valid. */
+/* Whether a sample is valid for the casters. */
 static bool is_outside(const vshi_field_error *of, const double position[3], const float normal[3]) {
     const vshi_truth *truth = &of->truth;
     uint8_t where = VSHI_OUTSIDE;
@@ -60,21 +56,21 @@ static bool is_outside(const vshi_field_error *of, const double position[3], con
     for (int k = 0; k < 3; ++k) {
         at[k] = position[k] + truth->lift * (double)normal[k];
     }
-    return where == VSHI_OUTSIDE && (truth->solids == NULL || vsh_solids_distance(truth->solids, at) > 0.0);
+    return where == VSHI_OUTSIDE && (truth->solids == NULL || vshi_solids_distance(truth->solids, at) > 0.0);
 }
 
-/* The place of a sample among the origins; false: it is not valid. */
+/* Finds a sample among the origins. False: it is not valid. */
 static bool find_origin(const vshi_origins *origins, size_t sample, uint32_t *origin) {
-    size_t low = 0, high = origins->count;
-    while (high - low > 1) {
-        const size_t middle = low + (high - low) / 2;
-        if (origins->sample[middle] <= sample) {
-            low = middle;
+    uint32_t low = 0, high = (uint32_t)origins->count;
+    while (low < high) {
+        const uint32_t middle = low + (high - low) / 2;
+        if (origins->sample[middle] < sample) {
+            low = middle + 1;
         } else {
             high = middle;
         }
     }
-    *origin = (uint32_t)low;
+    *origin = low;
     return low < origins->count && origins->sample[low] == sample;
 }
 
@@ -124,8 +120,8 @@ void vshi_truth_channel_close(vshi_truth_channel *channel) {
     channel->sampler = NULL;
 }
 
-/* Where the rays of a sample to the casters begin. Where a light is cut by the plane of the triangle, the
- * lift undoes what the facet hides. Elsewhere it only moves shadows, which is an error. */
+/* Finds the origin of a sample's rays to the casters. If the plane of the triangle cuts a light, the lift
+ * undoes what the facet hides. Elsewhere it only moves shadows, which is an error. */
 static void place(const vshi_truth_channel *channel, const vshi_samples *samples, size_t i,
                   double position[3]) {
     const vshi_lift_point point = vshi_sample_lift_point(samples, i);
@@ -133,9 +129,7 @@ static void place(const vshi_truth_channel *channel, const vshi_samples *samples
     if (vshi_light_is_cut(&channel->lifter, &point)) {
         p = vshi_add(p, vshi_lift_find(&channel->lifter, &point));
     }
-    position[0] = p.x;
-    position[1] = p.y;
-    position[2] = p.z;
+    vshi_vec_to_doubles(p, position);
 }
 
 static void add(double weight, double square, vsh_bake_error *sum) {
@@ -184,21 +178,4 @@ void vshi_field_error_settle(const vshi_held_texel *texel, double max_error, flo
         vshi_truth_settle(vshi_field_error_rays(max_error), free, texel->even, (double)value, seen);
         add(texel->weight, ((double)value - seen[0]) * ((double)value - seen[1]), sum);
     }
-}
-
-double vsh_bake_error_rmse(const vsh_bake_error *e) {
-    if (!(e->values > 0.0)) {
-        return NAN;
-    }
-    const double rays = e->square_error / e->values;
-    const double held = e->held > 0.0 ? e->held_square_error / e->held : 0.0;
-    return sqrt(rays > held ? rays : held > 0.0 ? held : 0.0);
-}
-
-double vsh_bake_error_field(const vsh_bake_error *e) {
-    if (!(e->values > 0.0) || !(e->held > 0.0)) {
-        return NAN;
-    }
-    const double more = e->held_square_error / e->held - e->square_error / e->values;
-    return more > 0.0 ? sqrt(more) : 0.0;
 }

@@ -1,7 +1,7 @@
-/* Charts that are hidden as a whole, as the bottom of a box that stands on another: no texel of theirs has a
- * value, and no one sees them. But lines of their borders show through where surfaces meet, and smaller
- * levels of the image have a part of them. So each texel takes the value of the texel that is nearest in the
- * world, of those at the edges of what is seen. */
+/* Charts that are hidden as a whole, as the bottom of a box on another. None of their texels has a value, and
+ * no one sees them. But lines of their borders show through where surfaces meet, and coarse mip levels
+ * contain them. So each texel takes the value of the texel that is nearest in the world, among the edges of
+ * visible surfaces. */
 #include "bake/padding.h"
 #include "bake/page.h"
 #include "bake/places.h"
@@ -16,67 +16,64 @@
 
 static const char what[] = "hidden charts";
 
-/* Texels that lookups at what is seen read are its chart's: those that took a value from as near, squared
- * texels, keep it. */
+/* A texel keeps a value of its chart from this near, squared texels: lookups at visible texels read it. */
 enum { OWN_SQUARE = 8 };
 
-/* Others keep the value of their chart's nearest texel where no place in the world is nearer than this part
- * of the way to it. */
+/* Other texels keep the value of their chart unless a place in the world is closer, by this factor. */
 static const float NEARER = 0.5F;
 
-/* Texels around a hidden chart that are its padding, at most. */
+/* The most padding around a hidden chart, texels. */
 enum { MOST_PADDING = 4 };
 
 static const uint32_t NONE = UINT32_MAX;
 
-/* Of a state: filled here; an empty one that was looked at. */
-enum { HIDDEN = VSHI_TEXEL_KINDS, LOOKED_AT };
+/* More states: filled here; an empty one already tested. */
+enum { HIDDEN = VSHI_TEXEL_KINDS, TESTED };
 
 typedef struct hiding {
     const vsh_charts *charts;
     const vsh_lightmap *lightmap;
+    size_t light_count;
     size_t width, height;
     vshi_store *store;
     uint8_t *state; /* [texels] */
-    uint32_t *mesh; /* [texels]: of the first sample, + 1; 0: none. Then the texel's place in `at`, + 1 */
-    float *at;      /* [place_count][3]: of texels that are hidden, or give values */
+    uint32_t *mesh; /* [texels]: of the first sample, + 1; 0: none. Later the texel's place in `at`, + 1 */
+    float *at;      /* [place_count][3]: places of hidden texels, and of texels that give values */
     size_t place_count;
     vshi_places seen;
-    uint32_t *hidden, *source; /* [hidden_count]: texels, and those whose values they have, then take; NONE */
+    uint32_t *hidden,
+        *source; /* [hidden_count]: texels, and their sources, first in the chart, later in the world; NONE */
     size_t hidden_count;
     uint64_t filled;
 } hiding;
 
 /* --- which texels */
 
-/* A cell's states as the bake left them, and each texel's mesh. */
-static void read_cell(const hiding *h, const vshi_tile *tile) {
-    for (size_t bit = 0; bit < VSHI_CELL * VSHI_CELL; ++bit) {
-        const uint32_t owner = vshi_tile_owner(&h->charts->sorted, tile, bit);
-        const size_t x = tile->cell.column * VSHI_CELL + bit % VSHI_CELL,
-                     y = tile->cell.row * VSHI_CELL + bit / VSHI_CELL, at = y * h->width + x;
-        if (owner != 0) {
-            h->state[at] = h->lightmap->coverage[at] != 0.0F ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
-            h->mesh[at] = tile->mesh[owner - 1] + 1;
-        }
-    }
-}
-
+/* Reads a tile's states after the bake, and each texel's mesh. */
 static vsh_result read_tile(void *user, size_t number, vsh_error *error) {
     const hiding *h = user;
     const vshi_charts *sorted = &h->charts->sorted;
     vshi_tile tile;
     const vsh_result result = vshi_tile_open(sorted, number, &tile, error);
     for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
-        if (vshi_tile_rasterize(sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS, NULL)) {
-            read_cell(h, &tile);
+        if (!vshi_tile_rasterize(sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS, NULL)) {
+            continue;
+        }
+        for (size_t bit = 0; bit < VSHI_CELL * VSHI_CELL; ++bit) {
+            const uint32_t owner = vshi_tile_owner(sorted, &tile, bit);
+            const size_t x = tile.cell.column * VSHI_CELL + bit % VSHI_CELL,
+                         y = tile.cell.row * VSHI_CELL + bit / VSHI_CELL, at = y * h->width + x;
+            if (owner != 0) {
+                h->state[at] = h->lightmap->coverage[at] != 0.0F ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+                h->mesh[at] = tile.triangle[owner - 1].mesh + 1;
+            }
         }
     }
     vshi_tile_close(&tile);
     return result;
 }
 
-/* Notes where the first samples of texels are that have a place. */
+/* Notes the places of texels that need one, by their first samples. */
 static void note_places(void *user, const vshi_samples *samples) {
     const hiding *h = user;
     for (size_t i = samples->count; i-- > 0;) {
@@ -87,33 +84,9 @@ static void note_places(void *user, const vshi_samples *samples) {
     }
 }
 
-static bool has_places(const hiding *h, size_t number) {
-    const size_t left = number % h->charts->sorted.columns * VSHI_TILE,
-                 top = number / h->charts->sorted.columns * VSHI_TILE;
-    for (size_t y = top; y < top + VSHI_TILE && y < h->height; ++y) {
-        for (size_t x = left; x < left + VSHI_TILE && x < h->width; ++x) {
-            if (h->mesh[y * h->width + x] > 0) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 static vsh_result place_tile(void *user, size_t number, vsh_error *error) {
     hiding *h = user;
-    return has_places(h, number) ? vshi_tile_visit(h->charts, number, false, note_places, h, error) : VSH_OK;
-}
-
-static vsh_result over_tiles(hiding *h, vshi_element_fn *fn, const vsh_run *run, vsh_error *error) {
-    const size_t tiles = vshi_charts_tiles(&h->charts->sorted);
-    vshi_job *job = vshi_job_begin(run, what, tiles);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-    }
-    const vsh_result result = vshi_parallel_each(job, tiles, 1, 1, fn, h, error);
-    vshi_job_end(job);
-    return result;
+    return vshi_tile_visit(h->charts, number, false, note_places, h, error);
 }
 
 static bool is_far(const hiding *h, uint32_t a, uint32_t b) {
@@ -122,7 +95,7 @@ static bool is_far(const hiding *h, uint32_t a, uint32_t b) {
     return x * x + y * y > OWN_SQUARE;
 }
 
-/* Lists texels that are not valid, but for those that are filled from near. */
+/* Lists texels that are not valid, without those filled from near. */
 static vsh_result find_hidden(hiding *h, vsh_error *error) {
     const size_t count = h->width * h->height;
     vshi_spread spread;
@@ -135,8 +108,9 @@ static vsh_result find_hidden(hiding *h, vsh_error *error) {
     for (size_t i = 0; i < count; ++i) {
         h->hidden_count += h->state[i] == VSHI_TEXEL_INVALID;
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&h->hidden, h->hidden_count, sizeof *h->hidden, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&h->source, h->hidden_count, sizeof *h->source, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(h->hidden, h->hidden_count),
+                                 VSHI_ARRAY(h->source, h->hidden_count)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
     size_t k = 0;
     for (size_t i = 0; i < spread.count; ++i) {
         if (is_far(h, spread.texel[i], spread.source[i])) {
@@ -159,7 +133,7 @@ static const float *place_of(const hiding *h, size_t texel) {
     return h->at + 3 * (size_t)(h->mesh[texel] - 1);
 }
 
-/* Whether a valid texel is at an edge of what is seen. */
+/* Whether a valid texel lies at an edge of the visible surface. */
 static bool is_edge(const hiding *h, size_t texel) {
     const size_t x = texel % h->width, y = texel / h->width;
     bool edge = x == 0 || y == 0 || x + 1 == h->width || y + 1 == h->height;
@@ -169,7 +143,7 @@ static bool is_edge(const hiding *h, size_t texel) {
     return edge;
 }
 
-/* Numbers the places that are needed: of valid texels at edges first, then of others. */
+/* Numbers the places that are needed: first valid texels at edges, then others. */
 static void number_places(hiding *h) {
     const size_t count = h->width * h->height;
     memset(h->mesh, 0, count * sizeof *h->mesh);
@@ -193,7 +167,7 @@ static vsh_result find_seen(hiding *h, const vsh_run *run, vsh_error *error) {
         return VSH_OK;
     }
     VSHI_TRY(vshi_store_take(h->store, (void **)&h->at, h->place_count, 3 * sizeof *h->at, what, error));
-    VSHI_TRY(over_tiles(h, place_tile, run, error));
+    VSHI_TRY(vshi_run_stage(run, what, vshi_charts_tiles(&h->charts->sorted), place_tile, h, error));
     VSHI_TRY(vshi_allocate((void **)&h->seen.list, h->seen.count, sizeof *h->seen.list, what, error));
     for (size_t i = 0; i < h->width * h->height; ++i) {
         if (h->mesh[i] > 0 && h->mesh[i] <= h->seen.count) {
@@ -210,7 +184,7 @@ static float square_between(const float a[3], const float b[3]) {
     return x * x + y * y + z * z;
 }
 
-/* The source of each; NONE: it keeps what its chart gave it. */
+/* Finds the source of each texel; NONE: it keeps its chart's value. */
 static void find_sources(void *user, size_t begin, size_t end) {
     const hiding *h = user;
     for (size_t i = begin; i < end; ++i) {
@@ -223,25 +197,18 @@ static void find_sources(void *user, size_t begin, size_t end) {
     }
 }
 
-/* --- values */
-
-static void copy_value(const vsh_lightmap *lightmap, size_t light_count, size_t from, size_t to) {
-    size_t kind_count;
-    const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
-    for (const vshi_plane_kind *kind = kinds; kind < kinds + kind_count; ++kind) {
-        const size_t components = vshi_plane_components(kind);
-        /* a direction in the tangent space of another chart is none in this one's */
-        const bool other = kind->holds == VSHI_HOLDS_VECTOR && lightmap->bent_space == VSH_BENT_TANGENT;
-        for (size_t i = 0; i < (kind->per_light ? light_count : 1) && kind->padded && !other; ++i) {
-            float *plane = vshi_plane_of(lightmap, kind, i);
-            if (plane != NULL) {
-                memcpy(plane + to * components, plane + from * components, components * sizeof *plane);
-            }
+static void copy_value(const hiding *h, size_t from, size_t to) {
+    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(h->lightmap, h->light_count, &c);) {
+        const size_t components = vshi_plane_components(c.kind);
+        /* a direction in another chart's tangent space means nothing here */
+        const bool other = c.kind->holds == VSHI_HOLDS_VECTOR && h->lightmap->bent_space == VSH_BENT_TANGENT;
+        if (c.kind->padded && !other) {
+            memcpy(c.values + to * components, c.values + from * components, components * sizeof *c.values);
         }
     }
 }
 
-/* The hidden texel that an empty one is padding of; SIZE_MAX: it is nearer to others, or to none. */
+/* The hidden texel that an empty one pads; SIZE_MAX: it is nearer to others, or to none. */
 static size_t padded_by(const hiding *h, size_t texel, int32_t reach) {
     const int32_t x = (int32_t)(texel % h->width), y = (int32_t)(texel / h->width);
     int32_t best = INT32_MAX;
@@ -254,7 +221,7 @@ static size_t padded_by(const hiding *h, size_t texel, int32_t reach) {
                 continue;
             }
             const size_t at = (size_t)(y + dy) * h->width + (size_t)(x + dx);
-            if (h->state[at] != VSHI_TEXEL_EMPTY && h->state[at] != LOOKED_AT) {
+            if (h->state[at] != VSHI_TEXEL_EMPTY && h->state[at] != TESTED) {
                 best = square;
                 by = h->state[at] == HIDDEN ? at : SIZE_MAX;
             }
@@ -263,9 +230,8 @@ static size_t padded_by(const hiding *h, size_t texel, int32_t reach) {
     return by;
 }
 
-/* Fills what is empty around a hidden texel, as far as its chart is what is nearest. */
-static void pad_around(const hiding *h, size_t texel, int32_t reach, const vsh_lightmap *lightmap,
-                       size_t light_count) {
+/* Fills empty texels around a hidden texel whose nearest chart is hidden. */
+static void pad_around(const hiding *h, size_t texel, int32_t reach) {
     const int32_t x = (int32_t)(texel % h->width), y = (int32_t)(texel / h->width);
     for (int32_t row = y - reach; row <= y + reach; ++row) {
         for (int32_t column = x - reach; column <= x + reach; ++column) {
@@ -276,36 +242,36 @@ static void pad_around(const hiding *h, size_t texel, int32_t reach, const vsh_l
             if (h->state[at] != VSHI_TEXEL_EMPTY) {
                 continue;
             }
-            h->state[at] = LOOKED_AT;
+            h->state[at] = TESTED;
             const size_t by = padded_by(h, at, reach);
             if (by != SIZE_MAX) {
-                copy_value(lightmap, light_count, by, at);
+                copy_value(h, by, at);
             }
         }
     }
 }
 
-static void fill(hiding *h, const vsh_lightmap *lightmap, size_t light_count) {
+static void fill(hiding *h) {
     const int32_t padding = h->charts->padding, reach = padding < MOST_PADDING ? padding : MOST_PADDING;
     for (size_t i = 0; i < h->hidden_count; ++i) {
         if (h->source[i] != NONE) {
-            copy_value(lightmap, light_count, h->source[i], h->hidden[i]);
+            copy_value(h, h->source[i], h->hidden[i]);
             h->state[h->hidden[i]] = HIDDEN;
             ++h->filled;
         }
     }
     for (size_t i = 0; i < h->hidden_count && reach > 0; ++i) {
         if (h->source[i] != NONE) {
-            pad_around(h, h->hidden[i], reach, lightmap, light_count);
+            pad_around(h, h->hidden[i], reach);
         }
     }
 }
 
-static vsh_result find_and_fill(hiding *h, size_t light_count, const vsh_run *run, vsh_error *error) {
+static vsh_result find_and_fill(hiding *h, const vsh_run *run, vsh_error *error) {
     const size_t count = h->width * h->height;
     VSHI_TRY(vshi_store_take(h->store, (void **)&h->state, count, 1, what, error));
     VSHI_TRY(vshi_store_take(h->store, (void **)&h->mesh, count, sizeof *h->mesh, what, error));
-    VSHI_TRY(over_tiles(h, read_tile, run, error));
+    VSHI_TRY(vshi_run_stage(run, what, vshi_charts_tiles(&h->charts->sorted), read_tile, h, error));
     VSHI_TRY(find_hidden(h, error));
     if (h->hidden_count == 0) {
         return VSH_OK;
@@ -314,14 +280,12 @@ static vsh_result find_and_fill(hiding *h, size_t light_count, const vsh_run *ru
     if (h->seen.count == 0) {
         return VSH_OK;
     }
-    vshi_job *job = vshi_job_begin(run, what, h->hidden_count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(run, what, h->hidden_count, &job, error));
     const vsh_result result = vshi_parallel_for(job, h->hidden_count, 256, 1, find_sources, h, error);
     vshi_job_end(job);
     VSHI_TRY(result);
-    fill(h, h->lightmap, light_count);
+    fill(h);
     return VSH_OK;
 }
 
@@ -330,6 +294,7 @@ vsh_result vshi_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightma
                                      uint64_t *filled, vsh_error *error) {
     hiding h = {.charts = charts,
                 .lightmap = lightmap,
+                .light_count = light_count,
                 .width = (size_t)charts->info.width,
                 .height = (size_t)charts->info.height,
                 .store = store};
@@ -337,7 +302,7 @@ vsh_result vshi_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightma
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu texels, at most %u", what, h.width * h.height,
                          UINT32_MAX - 1);
     }
-    const vsh_result result = find_and_fill(&h, light_count, run, error);
+    const vsh_result result = find_and_fill(&h, run, error);
     if (result == VSH_OK && filled != NULL) {
         *filled = h.filled;
     }

@@ -1,25 +1,26 @@
+/* Which samples of a tile are valid, and where their rays begin. */
 #include "bake/origins.h"
 #include "base/memory.h"
 #include "shade/ao.h"
-#include "shade/inside.h"
 #include "shade/kernel/march.h"
 #include "shade/layers.h"
+#include "shade/shade.h"
 #include "trace/embree.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Where a sample is looked at for whether it is free: a voxel above its surface, which is as much as the
- * field tells apart. Touching solids keep their inner surfaces in a mesh's level set, so under a box that
- * stands on a floor the distance falls by no more than the height. */
+/* Height, voxels, at which a sample is tested: a voxel, the resolution of the field. Touching solids keep
+ * their inner surfaces in a mesh's level set. So under a box on a floor the distance falls by no more than
+ * the height. */
 static const double PROBE_HEIGHT = 1.0;
-/* What is nearer than this at the probe, in its heights, is another surface: a sample in a crease, where the
- * field may be off by more than a start offset clears. Its rays begin at the probe. */
+/* A closer surface at the probe, as a share of its height, is another one. The sample lies in a crease, where
+ * the field may err by more than a start offset clears. Its rays begin at the probe. */
 static const double CREASE = 0.75;
-/* And nearer than this, which is all that a start offset clears, it may as well be within: the field is no
- * better known. On the cloister 1.4 % of the samples are so near; one in twelve is buried, reads up to 1
- * where it should be 0, and those made two thirds of AO's squared error. */
+/* Even closer, which is all that a start offset clears, the sample counts as inside: the field is not known
+ * better. On the cloister 1.4 % of the samples are so close. One in twelve of these is buried and reads up to
+ * 1 instead of 0. They made two thirds of AO's squared error. */
 static const double CLEAR = 0.25;
 
 /* The samples of a tile under way. */
@@ -29,15 +30,9 @@ typedef struct lifting {
     vshi_origins *origins;
 } lifting;
 
-static void put(vshi_vec p, double at[3]) {
-    at[0] = p.x;
-    at[1] = p.y;
-    at[2] = p.z;
-}
-
 static void lift(const lifting *l, size_t i, double offset, double shell, double origin[3]) {
     const vshi_samples *samples = l->samples;
-    const double height = offset + (vshi_sample_is_sheet(samples, i) ? shell : 0.0);
+    const double height = offset + ((samples->mesh[i] & VSHI_SAMPLE_SHEET) != 0 ? shell : 0.0);
     const vshi_vec p = vshi_sample_foot(samples, i);
     const double at[3] = {p.x, p.y, p.z};
     for (size_t k = 0; k < 3; ++k) {
@@ -45,32 +40,28 @@ static void lift(const lifting *l, size_t i, double offset, double shell, double
     }
 }
 
-/* Where a sample is looked at in a field, in its space. */
-static void probe(const lifting *l, const vshi_probed_field *in, size_t i, float at[3]) {
+/* The probe of a sample in a field, in its space. */
+static vshi_vec probe(const lifting *l, const vshi_probed_field *in, size_t i) {
     double origin[3];
     lift(l, i, in->probe, in->shell, origin);
-    const vshi_vec p = vshi_to_field(in->field, origin);
-    at[0] = (float)p.x;
-    at[1] = (float)p.y;
-    at[2] = (float)p.z;
+    return vshi_to_field(in->field, origin);
 }
 
-/* Samples that are looked at together follow each other in a cell, at most so many. */
+/* At most this many samples of a cell are tested together. */
 enum { TOGETHER = 64 };
 
-/* Looks at samples first … last - 1, which belong together, in a field that decides. */
-static void look(const lifting *l, size_t field, size_t first, size_t last) {
+/* Tests samples first … last - 1 together, in a field that decides. */
+static void test_in_field(const lifting *l, size_t field, size_t first, size_t last) {
     const vshi_probed_field *in = &l->placement->fields[field];
     const float radius = (float)(CREASE * in->probe / in->field->voxel_size);
     float at[3][TOGETHER];
     float *const centres[3] = {at[0], at[1], at[2]};
     bool is_free[TOGETHER];
     for (size_t i = first; i < last; ++i) {
-        float p[3];
-        probe(l, in, i, p);
-        for (size_t k = 0; k < 3; ++k) {
-            at[k][i - first] = p[k];
-        }
+        const vshi_vec p = probe(l, in, i);
+        at[0][i - first] = (float)p.x;
+        at[1][i - first] = (float)p.y;
+        at[2][i - first] = (float)p.z;
     }
     l->placement->kernel->balls(in->field, last - first, centres, radius, is_free);
     for (size_t i = first; i < last; ++i) {
@@ -97,29 +88,26 @@ typedef struct tracing {
     size_t first;
 } tracing;
 
-/* A vshi_open_fn: no surface is near but the sample's own, and what is within a solid the field knows. */
+/* A vshi_open_fn: only the sample's own surface is near, and the field knows solids. */
 static bool is_open(const void *user, size_t i) {
     const tracing *t = user;
-    float at[3];
-    probe(t->lifting, t->in, t->first + i, at);
-    return t->in->field->voxel_size * (double)vshi_field_distance(t->in->field, at) >= CREASE * t->in->probe;
+    const vshi_vec at = probe(t->lifting, t->in, t->first + i);
+    return t->in->field->voxel_size * vshi_distance_at(t->in->field, at) >= CREASE * t->in->probe;
 }
 
-static bool same_cell(const vshi_samples *samples, size_t i, size_t k) {
-    return ((samples->texel[i] ^ samples->texel[k]) & ~0x00070007u) == 0;
-}
-
-/* Behind the samples that are looked at together from `first` on. */
+/* The end of the samples that are tested together from `first` on: those of a cell. */
 static size_t together_end(const vshi_samples *samples, size_t first) {
+    const uint32_t *texel = samples->texel;
     size_t end = first + 1;
-    while (end < samples->count && end - first < TOGETHER && same_cell(samples, end, first)) {
+    while (end < samples->count && end - first < TOGETHER &&
+           ((texel[end] ^ texel[first]) & ~0x00070007u) == 0) {
         ++end;
     }
     return end;
 }
 
-/* Whether the point is inside a solid, by a ray along `way` from a little behind it. */
-static bool is_solid_behind(const vsh_triangles *triangles, const vshi_segment_ray *ray) {
+/* Whether the point is inside a solid, by a ray from a little behind it. */
+static bool is_solid_behind(const vshi_triangles *triangles, const vshi_segment_ray *ray) {
     vshi_segment_ray behind = *ray;
     for (size_t axis = 0; axis < 3; ++axis) {
         behind.origin[axis] += ray->far * ray->direction[axis];
@@ -128,13 +116,13 @@ static bool is_solid_behind(const vsh_triangles *triangles, const vshi_segment_r
     return vshi_triangles_depth(triangles, &behind) > 0;
 }
 
-/* Leaves out valid samples first … last - 1 that lie on another face. If that crosses the sample's plane,
- * every ray meets it at once: a short ray in the plane, across the sample, finds it. If it lies in the plane,
- * as that of a floor under a box, every ray begins behind it: a short ray back through the sample finds it.
+/* Makes samples first … last - 1 on another face invalid. If that face crosses the sample's plane, every ray
+ * meets it at once, and a short ray in the plane, across the sample, finds it. If it lies in the plane, as
+ * that of a floor under a box, every ray begins behind it, and a short ray back through the sample finds it.
  * Both sides of a card also lie in one plane, but have no solid between them. */
-static void leave_out_touching(const lifting *l, const vsh_triangles *triangles, size_t first, size_t last) {
-    static const double ACROSS[2] = {0.7648, 0.6442}; /* along no axis, and no edge that people build */
-    static const double NEAR = 0.25; /* of the lift: 16 roundings of a float; a wider gap is a gap */
+static void drop_touching(const lifting *l, const vshi_triangles *triangles, size_t first, size_t last) {
+    static const double ACROSS[2] = {0.7648, 0.6442}; /* along no axis, and no usual edge */
+    static const double NEAR = 0.25; /* share of the lift: 16 roundings of a float; a wider gap is a gap */
     const double lift = vshi_triangles_lift(triangles), near = NEAR * lift;
     vshi_segment_ray across[TOGETHER], back[TOGETHER];
     size_t of[TOGETHER], count = 0;
@@ -160,16 +148,16 @@ static void leave_out_touching(const lifting *l, const vsh_triangles *triangles,
     }
 }
 
-/* Looks at samples first … last - 1, which belong together, by rays against a field's triangles. */
-static void trace(const lifting *l, const vshi_probed_field *in, size_t first, size_t last) {
+/* Tests samples first … last - 1 together, by rays against a field's triangles. */
+static void test_by_rays(const lifting *l, const vshi_probed_field *in, size_t first, size_t last) {
     double at[3 * TOGETHER];
     uint8_t where[TOGETHER];
     bool follows[TOGETHER];
     size_t i = first;
-    do { /* there is one */
-        put(vshi_sample_foot(l->samples, i), at + 3 * (i - first));
+    do {
+        vshi_vec_to_doubles(vshi_sample_foot(l->samples, i), at + 3 * (i - first));
         follows[i - first] =
-            i > first && !vshi_sample_is_border(l->samples, i) && !vshi_sample_is_border(l->samples, i - 1);
+            i > first && ((l->samples->mesh[i] | l->samples->mesh[i - 1]) & VSHI_SAMPLE_BORDER) == 0;
     } while (++i < last);
     const tracing task = {l, in, first};
     vshi_inside(in->triangles, last - first, at, l->samples->geometric + 3 * first, follows, is_open, &task,
@@ -179,38 +167,32 @@ static void trace(const lifting *l, const vshi_probed_field *in, size_t first, s
             l->origins->valid[i] = 0;
         }
     }
-    leave_out_touching(l, in->triangles, first, last);
-}
-
-/* Samples within a heightfield or a sphere that are none of their surfaces. */
-static void look_at_solid(const lifting *l, size_t solid, size_t first, size_t last) {
-    for (size_t i = first; i < last; ++i) {
-        double at[3];
-        put(vshi_sample_foot(l->samples, i), at);
-        const bool held = l->placement->heights[solid] != NULL
-                              ? vshi_heights_hold(l->placement->heights[solid], at)
-                              : vshi_spheres_hold(l->placement->spheres[solid], at);
-        l->origins->valid[i] = l->origins->valid[i] && !held;
-    }
+    drop_touching(l, in->triangles, first, last);
 }
 
 static void validate_together(const lifting *l, size_t first, size_t last) {
-    memset(l->origins->valid + first, 1, last - first);
-    for (size_t field = 0; field < l->placement->field_count; ++field) {
-        if (l->placement->fields[field].triangles != NULL) {
-            trace(l, &l->placement->fields[field], first, last);
+    const vshi_placement *p = l->placement;
+    uint8_t *valid = l->origins->valid;
+    memset(valid + first, 1, last - first);
+    for (size_t field = 0; field < p->field_count; ++field) {
+        if (p->fields[field].triangles != NULL) {
+            test_by_rays(l, &p->fields[field], first, last);
         }
-        if (l->placement->fields[field].marched) {
-            look(l, field, first, last);
+        if (p->fields[field].marched) {
+            test_in_field(l, field, first, last);
         }
     }
-    for (size_t solid = 0; solid < l->placement->solid_count; ++solid) {
-        look_at_solid(l, solid, first, last);
+    for (size_t solid = 0; solid < p->solid_count; ++solid) {
+        for (size_t i = first; i < last; ++i) {
+            double at[3];
+            vshi_vec_to_doubles(vshi_sample_foot(l->samples, i), at);
+            valid[i] = valid[i] && !(p->heights[solid] != NULL ? vshi_heights_hold(p->heights[solid], at)
+                                                               : vshi_spheres_hold(p->spheres[solid], at));
+        }
     }
 }
 
-/* Samplers tell points apart by it: the texel, and for the further samples of a texel a place some
- * way off, so that they do not all send their rays the same way. */
+/* The texel for samplers. Further samples of a texel get a distant place, so that their rays differ. */
 static uint32_t sampler_texel(const vshi_samples *samples, size_t i) {
     static const uint32_t COLUMN_STEP = 47, ROW_STEP = 29;
     const uint32_t texel = samples->texel[i];
@@ -256,11 +238,8 @@ void vshi_origins_add_frame(const vshi_placement *placement, const vshi_samples 
     }
 }
 
-static void look_in(vshi_placement *p, const vsh_field *field, const vsh_triangles *triangles, int32_t method,
-                    int32_t ao_method, vshi_origins_for what) {
-    const bool traced = triangles != NULL;
-    const bool marched = (what.lights && vsh_shadow_method_resolve(method, traced) != VSH_SHADOW_EXACT) ||
-                         (what.ao && vsh_ao_method_resolve(ao_method, traced) != VSH_AO_EXACT);
+static void add_field(vshi_placement *p, const vsh_field *field, const vshi_triangles *triangles,
+                      bool marched) {
     p->fields[p->field_count++] =
         (vshi_probed_field){.field = field,
                             .probe = fmax(p->offset, PROBE_HEIGHT * field->voxel_size),
@@ -270,18 +249,22 @@ static void look_in(vshi_placement *p, const vsh_field *field, const vsh_triangl
 }
 
 vshi_placement vshi_placement_open(const vsh_occluders *occluders, const vsh_shade_options *options,
-                                   vshi_origins_for what, int32_t isa) {
+                                   bool lights, bool ao, int32_t isa) {
     vshi_placement p = {.kernel = vshi_kernel_of(isa),
                         .offset =
                             options->start_offset * occluders->field->voxel_size + options->surface_offset};
-    look_in(&p, occluders->field, occluders->triangles, options->method, options->ao_method, what);
+    vsh_shade_options own = *options;
+    const bool marches_ao = !vshi_ao_traces(options, occluders->triangles);
+    add_field(&p, occluders->field, occluders->triangles,
+              (lights && !vshi_shadow_traces(options, occluders->triangles)) || (ao && marches_ao));
     for (size_t i = 0; i < occluders->layer_count; ++i) {
-        const vsh_layer *layer = &occluders->layers[i];
+        const vshi_layer *layer = &occluders->layers[i];
+        own.method = layer->method < 0 ? options->method : layer->method;
         if (layer->field != NULL) {
-            const int32_t method = layer->method < 0 ? options->method : layer->method;
-            const vshi_origins_for here = {what.lights && !vshi_layer_is_closed(layer),
-                                           what.ao && layer->ao != 0};
-            look_in(&p, layer->field, layer->triangles, method, options->ao_method, here);
+            const bool shades = lights && !vshi_layer_is_closed(layer), occludes = ao && layer->ao != 0;
+            add_field(&p, layer->field, layer->triangles,
+                      (shades && !vshi_shadow_traces(&own, layer->triangles)) ||
+                          (occludes && !vshi_ao_traces(options, layer->triangles)));
         } else {
             p.heights[p.solid_count] = layer->heights;
             p.spheres[p.solid_count++] = layer->spheres;
@@ -291,16 +274,14 @@ vshi_placement vshi_placement_open(const vsh_occluders *occluders, const vsh_sha
 }
 
 vsh_result vshi_origins_allocate(vshi_origins *origins, size_t room, vsh_error *error) {
-    const char *what = "lightmap samples";
     *origins = (vshi_origins){.count = 0};
-    VSHI_TRY(vshi_allocate((void **)&origins->sample, room, sizeof *origins->sample, what, error));
-    VSHI_TRY(vshi_allocate((void **)&origins->position, room, 3 * sizeof *origins->position, what, error));
-    VSHI_TRY(vshi_allocate((void **)&origins->start, room, 3 * sizeof *origins->start, what, error));
-    VSHI_TRY(vshi_allocate((void **)&origins->normal, room, 3 * sizeof *origins->normal, what, error));
-    VSHI_TRY(vshi_allocate((void **)&origins->face, room, 3 * sizeof *origins->face, what, error));
-    VSHI_TRY(vshi_allocate((void **)&origins->texel, room, sizeof *origins->texel, what, error));
-    VSHI_TRY(vshi_allocate((void **)&origins->valid, room, 1, what, error));
-    return vshi_allocate((void **)&origins->crease, room, 1, what, error);
+    const vshi_array arrays[] = {
+        VSHI_ARRAY(origins->sample, room),    VSHI_ARRAY(origins->position, 3 * room),
+        VSHI_ARRAY(origins->start, 3 * room), VSHI_ARRAY(origins->normal, 3 * room),
+        VSHI_ARRAY(origins->face, 3 * room),  VSHI_ARRAY(origins->texel, room),
+        VSHI_ARRAY(origins->valid, room),     VSHI_ARRAY(origins->crease, room),
+    };
+    return VSHI_ALLOCATE_ALL(arrays, "lightmap samples", error);
 }
 
 void vshi_origins_free(vshi_origins *origins) {
@@ -320,6 +301,6 @@ void vshi_origins_lift(const vshi_lifter *lifter, const vshi_samples *samples, b
     for (size_t k = 0; k < origins->count + origins->frame; ++k) {
         const vshi_lift_point point = vshi_sample_lift_point(samples, origins->sample[k]);
         const vshi_vec base = traced ? point.foot : vshi_vec_of(origins->position + 3 * k);
-        put(vshi_add(base, vshi_lift_find(lifter, &point)), origins->start + 3 * k);
+        vshi_vec_to_doubles(vshi_add(base, vshi_lift_find(lifter, &point)), origins->start + 3 * k);
     }
 }

@@ -1,5 +1,6 @@
+/* Filling texels without a value, in three ways: around charts, within charts, everywhere else. */
 #include "bake/padding.h"
-#include "base/parallel.h"
+#include "shade/shade.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -18,7 +19,7 @@ typedef struct filling {
     int32_t reach; /* the largest radius */
     const vshi_plane *planes;
     size_t plane_count;
-    uint8_t *filled; /* [height][width]; NULL: not asked for */
+    uint8_t *filled; /* [height][width]; NULL: not wanted */
     int16_t *down;   /* [height][width]: rows from a texel to the nearest valid one of its column; NO_ROW */
 } filling;
 
@@ -49,7 +50,7 @@ static void search_columns(void *user, size_t begin, size_t end) {
     }
 }
 
-/* Index of the texel that (x, y) is filled from, or SIZE_MAX. */
+/* Index of the texel whose value (x, y) takes, or SIZE_MAX. */
 static size_t search_row(const filling *f, size_t x, size_t y, int32_t radius) {
     int64_t best = (int64_t)radius * radius;
     size_t source = SIZE_MAX;
@@ -119,11 +120,9 @@ vsh_result vshi_padding_fill(vshi_store *store, const vsh_run *run, int32_t widt
         return VSH_OK;
     }
     const size_t strips = (f.width + STRIP - 1) / STRIP;
-    /* Progress in columns' worth of texels and rows' worth of texels alike. */
-    vshi_job *job = vshi_job_begin(run, "padding", f.width * f.height * 2);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "padding: the system refused memory");
-    }
+    /* Columns and rows report progress in texels. */
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(run, "padding", f.width * f.height * 2, &job, error));
     vsh_result result;
     VSHI_TRY_DONE(
         vshi_store_take(store, (void **)&f.down, f.width * f.height, sizeof *f.down, "padding", error));
@@ -172,7 +171,7 @@ static int64_t square_between(const spreading *s, size_t a, size_t b) {
     return x * x + y * y;
 }
 
-/* Of the sources around a texel the nearest, of equally near ones the first in the image. */
+/* The nearest source around a texel, of equally near ones the first in the image. */
 static uint32_t nearest_source(const spreading *s, size_t texel) {
     size_t around[8];
     const size_t count = neighbours_of(s, texel, around);
@@ -365,10 +364,8 @@ vsh_result vshi_pull_push(vshi_store *store, const vsh_run *run, int32_t width, 
     if (plane_count == 0) {
         return VSH_OK;
     }
-    pulling p = {.store = store, .job = vshi_job_begin(run, "padding", (size_t)height * plane_count)};
-    if (p.job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "padding: the system refused memory");
-    }
+    pulling p = {.store = store};
+    VSHI_TRY(vshi_begin_stage(run, "padding", (size_t)height * plane_count, &p.job, error));
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < plane_count && result == VSH_OK; ++i) {
         const level finest = {(size_t)width, (size_t)height, planes[i].values, filled};

@@ -7,9 +7,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-enum { DEEPEST = 64, FEW = 8 /* places that are looked at one by one */ };
+enum { DEEPEST = 64, FEW = 8 /* places that are tested one by one */ };
 
-/* By an axis, then by number, so that the order does not depend on that they came in. */
+/* By an axis, then by number, so that the input's order does not matter. */
 static bool is_before(const vshi_place *a, const vshi_place *b, int axis) {
     return a->at[axis] < b->at[axis] || (a->at[axis] == b->at[axis] && a->number < b->number);
 }
@@ -20,41 +20,23 @@ static void swap(vshi_place *a, vshi_place *b) {
     *b = moved;
 }
 
-/* Puts the place that belongs at `middle` there, those before it below, and the others above (Hoare, "Find",
+/* Moves the place that belongs at `middle` there, smaller ones below and larger ones above (Hoare, "Find",
  * 1961). */
 static void select_middle(vshi_place *list, size_t begin, size_t end, size_t middle, int axis) {
     while (end - begin > 1) {
-        const size_t last = end - 1, centre = begin + (end - begin) / 2;
-        if (is_before(&list[centre], &list[begin], axis)) {
-            swap(&list[centre], &list[begin]);
-        }
-        if (is_before(&list[last], &list[begin], axis)) {
-            swap(&list[last], &list[begin]);
-        }
-        if (is_before(&list[last], &list[centre], axis)) {
-            swap(&list[last], &list[centre]);
-        }
-        const vshi_place pivot = list[centre];
-        size_t low = begin, high = last;
-        while (low <= high) {
-            while (is_before(&list[low], &pivot, axis)) {
-                ++low;
-            }
-            while (is_before(&pivot, &list[high], axis)) {
-                --high;
-            }
-            if (low <= high) {
-                swap(&list[low++], &list[high]);
-                if (high == 0) {
-                    break;
-                }
-                --high;
+        vshi_place *pivot = &list[end - 1];
+        size_t below = begin;
+        swap(&list[begin + (end - begin) / 2], pivot);
+        for (size_t i = begin; i < end - 1; ++i) {
+            if (is_before(&list[i], pivot, axis)) {
+                swap(&list[i], &list[below++]);
             }
         }
-        if (middle <= high) {
-            end = high + 1;
-        } else if (middle >= low) {
-            begin = low;
+        swap(&list[below], pivot);
+        if (below < middle) {
+            begin = below + 1;
+        } else if (below > middle) {
+            end = below;
         } else {
             return;
         }
@@ -116,7 +98,7 @@ typedef struct nearest {
     uint32_t number;
 } nearest;
 
-static void look_at(const vshi_place *place, const float at[3], nearest *best) {
+static void consider(const vshi_place *place, const float at[3], nearest *best) {
     const float x = place->at[0] - at[0], y = place->at[1] - at[1], z = place->at[2] - at[2];
     const float square = x * x + y * y + z * z;
     if (square < best->square ||
@@ -147,12 +129,12 @@ uint32_t vshi_places_nearest(const vshi_places *places, const float at[3], float
             const vshi_place *place = &places->list[middle];
             const float over = at[places->axis[middle]] - place->at[places->axis[middle]];
             const part below = {p.begin, middle}, above = {middle + 1, p.end};
-            look_at(place, at, &best);
+            consider(place, at, &best);
             open[count++] = (far_part){over < 0.0F ? above : below, over * over};
             p = over < 0.0F ? below : above;
         }
         for (size_t i = p.begin; i < p.end; ++i) {
-            look_at(&places->list[i], at, &best);
+            consider(&places->list[i], at, &best);
         }
     }
     return best.number;
@@ -164,8 +146,7 @@ typedef struct line_part {
     float begin, end;
 } line_part;
 
-/* Cuts the line where it is farther than `within` beyond the plane, on the side that a sign points away from.
- */
+/* Cuts off the part of the line farther than `within` beyond the plane, against the sign. */
 static line_part cut(line_part p, part of, float at, float along, float plane, float sign, float within) {
     const float over = sign * (at - plane) - within, step = sign * along;
     p.part = of;

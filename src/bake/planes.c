@@ -1,3 +1,4 @@
+/* The table of planes, and the sky. */
 #include "bake/planes.h"
 
 #include "base/vec.h"
@@ -18,7 +19,7 @@ float vshi_sky_weighed(const float normal[3], const double up[3], float open) {
     return (float)(over * (double)open);
 }
 
-/* The sky is AO of what is over the horizon, within a distance that no caster is beyond. */
+/* The sky is AO of the directions above the horizon, within a distance beyond all casters. */
 vsh_shade_options vshi_sky_options(const vsh_shade_options *options, int32_t axis) {
     static const double FAR = 0x1p60;
     vsh_shade_options sky = *options;
@@ -37,10 +38,10 @@ static const vshi_plane_kind kinds[] = {
     {"error", .per_light = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_DEVIATION, PLANE(shadow_error)},
     {"error.ao", .needs = VSHI_NEEDS_AO | VSHI_NEEDS_DEVIATION, PLANE(ao_error)},
     {"irradiance", "RGB", VSHI_HOLDS_LIGHT, .range = VSHI_RANGE_LIGHT, .padded = true,
-     .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_IRRADIANCE, PLANE(irradiance)},
-    {"bent", "XYZ", VSHI_HOLDS_VECTOR, .padded = true, .needs = VSHI_NEEDS_AO | VSHI_NEEDS_BENT, PLANE(bent)},
+     .needs = VSHI_NEEDS_LIGHTS, PLANE(irradiance)},
+    {"bent", "XYZ", VSHI_HOLDS_VECTOR, .padded = true, .needs = VSHI_NEEDS_AO, PLANE(bent)},
     {"tint", "RGB", VSHI_HOLDS_LIGHT, .per_light = true, .range = VSHI_RANGE_SHARE, .padded = true,
-     .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_TINT, PLANE(tint)},
+     .needs = VSHI_NEEDS_LIGHTS, PLANE(tint)},
     {"sky", .range = VSHI_RANGE_SHARE, .padded = true, .needs = VSHI_NEEDS_OPEN, WISHED(sky)},
     {"invalid", WISHED(invalid)},
     {"A", PLANE(coverage)},
@@ -52,34 +53,41 @@ const vshi_plane_kind *vshi_plane_kinds(size_t *count) {
     return kinds;
 }
 
-static bool is_channel_of(const vshi_plane_kind *kind, const char *name) {
-    const size_t length = strlen(kind->name);
-    return strncmp(name, kind->name, length) == 0 && (name[length] == '\0' || name[length] == '.');
-}
-
 bool vshi_channel_range(const char *name, float *low, float *high) {
-    static const float ROUNDING = 1e-4f; /* of means of unit directions and of shares */
-    const vshi_plane_kind *kind = kinds;
-    while (kind < kinds + KINDS && !is_channel_of(kind, name)) {
-        ++kind;
+    static const float ROUNDING = 1e-4f; /* for means of unit directions and of shares */
+    for (const vshi_plane_kind *kind = kinds; kind < kinds + KINDS; ++kind) {
+        const size_t length = strlen(kind->name);
+        if (strncmp(name, kind->name, length) == 0 && (name[length] == '\0' || name[length] == '.')) {
+            const bool is_error = (kind->needs & VSHI_NEEDS_DEVIATION) != 0;
+            *low = (kind->holds == VSHI_HOLDS_VECTOR ? -1.0f : 0.0f) - ROUNDING;
+            *high = is_error || kind->range == VSHI_RANGE_LIGHT ? FLT_MAX : 1.0f + ROUNDING;
+            return is_error; /* methods without an estimate give NaN */
+        }
     }
-    const uint32_t needs = kind < kinds + KINDS ? kind->needs : VSHI_NEEDS_DEVIATION;
-    const bool is_error = (needs & VSHI_NEEDS_DEVIATION) != 0, is_vector = (needs & VSHI_NEEDS_BENT) != 0;
-    *low = (is_vector ? -1.0f : 0.0f) - ROUNDING;
-    *high = is_error || (needs & VSHI_NEEDS_IRRADIANCE) != 0 ? FLT_MAX : 1.0f + ROUNDING;
-    return is_error; /* methods without an estimate give NaN */
+    *low = -ROUNDING;
+    *high = FLT_MAX;
+    return true;
 }
 
-float *vshi_plane_of(const vsh_lightmap *lightmap, const vshi_plane_kind *kind, size_t light) {
-    const char *at = (const char *)lightmap + kind->plane;
-    if (!kind->per_light) {
-        return *(float *const *)at;
-    }
-    float *const *list = *(float *const *const *)at;
-    return list != NULL ? list[light] : NULL;
+bool vshi_plane_next(const vsh_lightmap *lightmap, size_t light_count, vshi_plane_cursor *c) {
+    do {
+        if (c->kind != NULL && c->kind->per_light && c->light + 1 < light_count) {
+            ++c->light;
+        } else {
+            c->kind = c->kind == NULL ? kinds : c->kind + 1;
+            c->light = 0;
+        }
+        if (c->kind == kinds + KINDS) {
+            return false;
+        }
+        const char *at = (const char *)lightmap + c->kind->plane;
+        float *const *list = c->kind->per_light ? *(float *const *const *)at : (float *const *)at;
+        c->values = list != NULL && !(c->kind->per_light && light_count == 0) ? list[c->light] : NULL;
+    } while (c->values == NULL);
+    return true;
 }
 
-void vshi_plane_put(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *const *planes) {
+void vshi_plane_set(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *const *planes) {
     char *at = (char *)lightmap + kind->plane;
     if (kind->per_light) {
         *(float *const **)at = planes;
@@ -88,28 +96,7 @@ void vshi_plane_put(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *
     }
 }
 
-uint32_t vshi_planes_need_of_light(const vsh_lightmap *lightmap, size_t light) {
-    uint32_t needs = 0;
-    for (size_t k = 0; k < KINDS; ++k) {
-        const bool of_lights = (kinds[k].needs & VSHI_NEEDS_LIGHTS) != 0;
-        needs |= of_lights && vshi_plane_of(lightmap, &kinds[k], light) != NULL ? kinds[k].needs : 0;
-    }
-    return needs;
-}
-
-uint32_t vshi_planes_need(const vsh_lightmap *lightmap, size_t light_count) {
-    uint32_t needs = 0;
-    for (size_t i = 0; i < light_count; ++i) {
-        needs |= vshi_planes_need_of_light(lightmap, i);
-    }
-    for (size_t k = 0; k < KINDS; ++k) {
-        const bool of_lights = (kinds[k].needs & VSHI_NEEDS_LIGHTS) != 0;
-        needs |= !of_lights && vshi_plane_of(lightmap, &kinds[k], 0) != NULL ? kinds[k].needs : 0;
-    }
-    return needs;
-}
-
-uint32_t vshi_planes_need_given(const vsh_lightmap *lightmap) {
+uint32_t vshi_planes_need(const vsh_lightmap *lightmap) {
     uint32_t needs = 0;
     for (size_t k = 0; k < KINDS; ++k) {
         needs |= vshi_plane_given(lightmap, &kinds[k]) ? kinds[k].needs : 0;
@@ -117,7 +104,7 @@ uint32_t vshi_planes_need_given(const vsh_lightmap *lightmap) {
     return needs;
 }
 
-int32_t vsh_planes_shaded(const vsh_planes *planes) {
+int32_t vshi_planes_shaded(const vsh_planes *planes) {
     int32_t count = 0;
     for (size_t k = 0; k < KINDS; ++k) {
         count += (kinds[k].needs & VSHI_NEEDS_OPEN) != 0 && vshi_plane_wished(&kinds[k], planes);

@@ -1,9 +1,9 @@
 /* Edge functions after Pineda, "A Parallel Algorithm for Polygon Rasterization" (1988), with the top-left
- * rule. Corners are rounded to an integer grid of 2^21 steps between two samples, on which every sign is
- * exact in 128 bits: a sample belongs to exactly one of the triangles around an edge or a corner. The grid
- * holds UVs up to some 10^5 squares away; what is farther is clamped there, since it lies far outside the
- * image and its shape no longer tells. */
-#include "bake/raster.h"
+ * rule. Corners are rounded to an integer grid of 2^21 steps between two samples. Every sign on it is exact
+ * in 128 bits: a sample belongs to exactly one of the triangles around an edge or a corner. The grid holds
+ * UVs up to some 10^5 squares away. Farther corners are clamped, since their shape no longer shows in the
+ * image. */
+#include "bake/texels.h"
 
 #include <math.h>
 #include <string.h>
@@ -135,8 +135,9 @@ static void sample_range(int64_t low, int64_t high, int64_t cell_first, int64_t 
     *last = *last < samples - 1 ? *last : samples - 1;
 }
 
-vshi_cell_overlap vshi_cell_cover(const vshi_raster *raster, const vshi_uv_triangle *triangle,
-                                  uint32_t number, const uint64_t *object, vshi_cell *cell) {
+vshi_cell_overlap vshi_cell_cover(const vshi_raster *raster, const vshi_uv_triangle *triangles,
+                                  uint32_t index, vshi_cell *cell) {
+    const vshi_uv_triangle *triangle = &triangles[index];
     const int32_t n = raster->supersample;
     const int64_t side = (int64_t)VSHI_CELL * n;
     const int64_t left = (int64_t)cell->column * side, top = (int64_t)cell->row * side;
@@ -170,12 +171,11 @@ vshi_cell_overlap vshi_cell_cover(const vshi_raster *raster, const vshi_uv_trian
             if (value[0] + bias[0] > 0 && value[1] + bias[1] > 0 && value[2] + bias[2] > 0) {
                 const uint64_t texel = (uint64_t)1 << (line + x / n);
                 if (owner[x] == 0) {
-                    owner[x] = number;
+                    owner[x] = index + 1;
                     cell->covered |= texel;
                 } else {
-                    const bool other = object != NULL && object[owner[x] - 1] != object[number - 1];
                     taken.texels |= texel;
-                    taken.others |= other ? texel : 0;
+                    taken.others |= triangles[owner[x] - 1].object != triangle->object ? texel : 0;
                 }
             }
             value[0] += step_x[0];
@@ -204,8 +204,31 @@ static bool touches(const vshi_raster *raster, const vshi_uv_triangle *triangle,
     return true;
 }
 
-void vshi_cell_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle, uint32_t number,
+/* Finds the point of the triangle's outline nearest to a point outside it; returns the squared distance. */
+static double nearest_point(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
+    double best = INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        const double dx = triangle->x[j] - triangle->x[i], dy = triangle->y[j] - triangle->y[i];
+        const double px = x - triangle->x[i], py = y - triangle->y[i];
+        const double length2 = dx * dx + dy * dy;
+        double t = length2 > 0.0 ? (px * dx + py * dy) / length2 : 0.0;
+        t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
+        const double qx = px - t * dx, qy = py - t * dy;
+        const double distance = qx * qx + qy * qy;
+        if (distance < best) {
+            best = distance;
+            weight[i] = 1.0 - t;
+            weight[j] = t;
+            weight[(i + 2) % 3] = 0.0;
+        }
+    }
+    return best;
+}
+
+void vshi_cell_touch(const vshi_raster *raster, const vshi_uv_triangle *triangles, uint32_t index,
                      vshi_cell *cell) {
+    const vshi_uv_triangle *triangle = &triangles[index];
     const uint64_t open = cell->inside & ~cell->covered;
     if (open == 0) {
         return;
@@ -228,35 +251,14 @@ void vshi_cell_touch(const vshi_raster *raster, const vshi_uv_triangle *triangle
             }
             double weight[3];
             const double distance =
-                vshi_uv_nearest(triangle, (double)(left + x) + 0.5, (double)(top + y) + 0.5, weight);
+                nearest_point(triangle, (double)(left + x) + 0.5, (double)(top + y) + 0.5, weight);
             if (((cell->border >> bit) & 1) == 0 || distance < cell->distance[bit]) {
                 cell->border |= (uint64_t)1 << bit;
-                cell->nearest[bit] = number;
+                cell->nearest[bit] = index + 1;
                 cell->distance[bit] = distance;
             }
         }
     }
-}
-
-double vshi_uv_nearest(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
-    double best = INFINITY;
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3;
-        const double dx = triangle->x[j] - triangle->x[i], dy = triangle->y[j] - triangle->y[i];
-        const double px = x - triangle->x[i], py = y - triangle->y[i];
-        const double length2 = dx * dx + dy * dy;
-        double t = length2 > 0.0 ? (px * dx + py * dy) / length2 : 0.0;
-        t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
-        const double qx = px - t * dx, qy = py - t * dy;
-        const double distance = qx * qx + qy * qy;
-        if (distance < best) {
-            best = distance;
-            weight[i] = 1.0 - t;
-            weight[j] = t;
-            weight[(i + 2) % 3] = 0.0;
-        }
-    }
-    return best;
 }
 
 /* Clips a convex polygon to sign × (axis coordinate - limit) <= 0 (Sutherland and Hodgman, "Reentrant polygon
@@ -282,7 +284,7 @@ static int clip(const double (*from)[2], int count, int axis, double sign, doubl
 void vshi_uv_centroid_near(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
     enum { MOST = 3 + 4 }; /* corners: each clip adds one at most */
     double polygon[2][MOST][2], at[2] = {0.0, 0.0};
-    vshi_uv_nearest(triangle, x, y, weight);
+    nearest_point(triangle, x, y, weight);
     for (int k = 0; k < 3; ++k) {
         at[0] += weight[k] * triangle->x[k];
         at[1] += weight[k] * triangle->y[k];
@@ -318,7 +320,7 @@ void vshi_uv_barycentric(const vshi_uv_triangle *triangle, double x, double y, d
     const double b = (px * by - py * bx) / area;
     const double c = (ax * py - ay * px) / area;
     if (!isfinite(b) || !isfinite(c)) {
-        vshi_uv_nearest(triangle, x, y, weight);
+        nearest_point(triangle, x, y, weight);
         return;
     }
     weight[0] = fmax(1.0 - b - c, 0.0);

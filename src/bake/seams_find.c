@@ -1,15 +1,16 @@
-/* Finds charts and the seams between them. Edges that have equal ends in the world are compared. Two
- * triangles are of one chart if the edge's coordinates in the lightmap are equal, too. Otherwise there is a
- * seam, if the surface is smooth.
+/* Finds charts and the seams between them, by edges with equal ends in the world. Two triangles are of one
+ * chart if the edge's coordinates in the lightmap are equal too. Otherwise there is a seam if the surface is
+ * smooth.
  *
  * At a T-junction an edge ends in the middle of a longer one. A tree holds the ends of open edges. Each open
  * edge is cut at the ends that lie on it, so that its parts have the same ends as their neighbours. */
 #include "bake/places.h"
 #include "bake/seams.h"
-#include "base/hash.h"
+#include "base/bytes.h"
 #include "base/memory.h"
+#include "mesh/edges.h"
 #include "mesh/mesh.h"
-#include "mesh/weld.h"
+#include "shade/shade.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -17,16 +18,17 @@
 
 static const char what[] = "seams";
 
-/* Pairs of an edge with those before it: what many triangles meet at is no surface. */
+/* Each triangle at an edge is compared with this many before it. Many triangles at one edge are no surface.
+ */
 enum { MOST_PAIRS = 8 };
 
 typedef struct seam_search {
     const vshi_seam_pages *pages;
-    double cosine; /* of the largest angle between normals that are smooth */
+    double cosine; /* of the largest angle between smooth normals */
     const vsh_run *run;
     vshi_job *job;
-    uint8_t *goes_on;  /* [3 triangles]: the surface does beyond the edge; or its triangle has no area */
-    vshi_seams *seams; /* `chart` holds sets of triangles, and a seam's charts are triangles, until the end */
+    uint8_t *goes_on;  /* [3 triangles]: the surface continues beyond the edge, or its triangle has no area */
+    vshi_seams *seams; /* until the end, `chart` holds sets of triangles, and a seam's charts are triangles */
     size_t room;       /* of the list */
     double held;       /* bytes, beside the list */
 } seam_search;
@@ -37,8 +39,8 @@ typedef struct edge_end {
     const vshi_raster *raster;
     size_t triangle; /* of the mesh */
     uint32_t page;
-    uint32_t vertex[2]; /* that it is between, */
-    double t;           /* and how far from the first to the second */
+    uint32_t vertex[2]; /* ends of the whole edge */
+    double t;           /* place from the first vertex to the second, 0 … 1 */
     vshi_vec at;
     double x, y; /* texels */
 } edge_end;
@@ -53,7 +55,7 @@ static bool is_same_place(vshi_vec a, vshi_vec b) {
 
 /* The mesh of edge 3 × triangle + corner, and the triangle's number there. */
 static const vsh_mesh *mesh_of_edge(const vshi_seam_pages *pages, uint32_t edge, size_t *local) {
-    const size_t page = vshi_seam_page(pages, edge / 3);
+    const size_t page = vshi_find_group(pages->first, pages->count, edge / 3);
     const vshi_charts *charts = pages->charts[page];
     return &charts->meshes[vshi_charts_mesh(charts, edge / 3 - pages->first[page], local)];
 }
@@ -64,10 +66,10 @@ static const vsh_mesh *mesh_of_edge(const vshi_seam_pages *pages, uint32_t edge,
  * bilinear lookup reads the same place on both sides of so narrow a seam. */
 static const double SAME_PLACE = 1.0 / 1024.0;
 
-static void look_at_edge(const vshi_seam_pages *pages, uint32_t edge, edge_end ends[2]) {
+static void find_ends(const vshi_seam_pages *pages, uint32_t edge, edge_end ends[2]) {
     size_t local;
     const vsh_mesh *mesh = mesh_of_edge(pages, edge, &local);
-    const size_t page = vshi_seam_page(pages, edge / 3);
+    const size_t page = vshi_find_group(pages->first, pages->count, edge / 3);
     const vshi_raster *raster = &pages->charts[page]->raster;
     const uint32_t *corner = mesh->indices + 3 * local;
     for (uint32_t k = 0; k < 2; ++k) {
@@ -85,12 +87,8 @@ static void look_at_edge(const vshi_seam_pages *pages, uint32_t edge, edge_end e
     }
 }
 
-static bool are_same_in_lightmap(const edge_end a[2], const edge_end b[2]) {
-    bool all = a[0].page == b[0].page;
-    for (int k = 0; k < 2; ++k) {
-        all = all && fabs(a[k].x - b[k].x) <= SAME_PLACE && fabs(a[k].y - b[k].y) <= SAME_PLACE;
-    }
-    return all;
+static bool is_same_in_lightmap(const edge_end *a, const edge_end *b) {
+    return a->page == b->page && fabs(a->x - b->x) <= SAME_PLACE && fabs(a->y - b->y) <= SAME_PLACE;
 }
 
 static vshi_vec normal_of(const vsh_mesh *mesh, uint32_t vertex) {
@@ -114,23 +112,15 @@ static vshi_vec normal_at(const edge_end *end) {
     return normal;
 }
 
-static bool are_smooth(const edge_end a[2], const edge_end b[2], double cosine) {
-    bool all = true;
-    for (int k = 0; k < 2; ++k) {
-        all = all && vshi_dot(normal_at(&a[k]), normal_at(&b[k])) >= cosine;
-    }
-    return all;
+static bool is_smooth(const edge_end *a, const edge_end *b, double cosine) {
+    return vshi_dot(normal_at(a), normal_at(b)) >= cosine;
 }
 
 /* Texels outside the image are not baked. */
 static bool are_inside(const edge_end a[2]) {
-    const vshi_raster *raster = a[0].raster;
-    bool all = true;
-    for (int k = 0; k < 2; ++k) {
-        all = all && a[k].x >= -SAME_PLACE && a[k].x <= raster->width + SAME_PLACE && a[k].y >= -SAME_PLACE &&
-              a[k].y <= raster->height + SAME_PLACE;
-    }
-    return all;
+    const double width = a[0].raster->width + SAME_PLACE, height = a[0].raster->height + SAME_PLACE;
+    return fmin(a[0].x, a[1].x) >= -SAME_PLACE && fmax(a[0].x, a[1].x) <= width &&
+           fmin(a[0].y, a[1].y) >= -SAME_PLACE && fmax(a[0].y, a[1].y) <= height;
 }
 
 static vsh_result add_seam(seam_search *search, const vshi_seam *seam, vsh_error *error) {
@@ -149,8 +139,9 @@ static vsh_result compare_pair(seam_search *search, const uint32_t edge[2], cons
                                const edge_end b[2], bool *goes_on, vsh_error *error) {
     const bool turned = !is_same_place(a[0].at, b[0].at);
     const edge_end second[2] = {b[turned], b[!turned]};
-    const bool one_chart = are_same_in_lightmap(a, second);
-    *goes_on = one_chart || are_smooth(a, second, search->cosine);
+    const bool one_chart = is_same_in_lightmap(&a[0], &second[0]) && is_same_in_lightmap(&a[1], &second[1]);
+    *goes_on = one_chart ||
+               (is_smooth(&a[0], &second[0], search->cosine) && is_smooth(&a[1], &second[1], search->cosine));
     if (one_chart) {
         vshi_set_join(search->seams->chart, edge[0] / 3, edge[1] / 3);
     } else if (*goes_on && are_inside(a) && are_inside(second)) {
@@ -165,13 +156,13 @@ static vsh_result compare_pair(seam_search *search, const uint32_t edge[2], cons
 
 /* --- T-junctions */
 
-/* Distance from an end to an edge that it lies on, at most, as a share of the largest coordinate. Rounding
- * moves ends by 6e-8 of it. */
+/* The largest distance from an end to the edge that it lies on, as a share of the largest coordinate.
+ * Rounding moves ends by 6e-8 of it. */
 static const double ON_EDGE = 5e-7;
 
 enum {
-    MOST_CUTS = 1024,    /* of an edge: what is cut more often is no edge of a wall */
-    MOST_LOOKED = 65536, /* ends near an edge */
+    MOST_CUTS = 1024,    /* of an edge; more cuts come from no edge of a wall */
+    MOST_LOOKED = 65536, /* ends near an edge that are tested */
     POLL_PARTS = 256
 };
 
@@ -191,7 +182,7 @@ typedef struct on_edge {
 
 typedef struct finding {
     seam_search *search;
-    uint32_t *edges; /* [count]: that end somewhere */
+    uint32_t *edges; /* [count]: open edges */
     size_t count;
     vshi_vec centre;
     double within;
@@ -199,7 +190,7 @@ typedef struct finding {
     part *parts;      /* [part_count] */
     size_t part_count, part_room;
     bool any_cut;
-    /* of the edge that is looked at */
+    /* of the current edge */
     vshi_vec at[2];
     on_edge cuts[MOST_CUTS];
     size_t cut_count, looked;
@@ -214,13 +205,10 @@ static void places_of(const finding *f, uint32_t edge, vshi_vec at[2]) {
 }
 
 static void to_floats(const finding *f, vshi_vec place, float at[3]) {
-    const vshi_vec from = vshi_sub(place, f->centre);
-    at[0] = (float)from.x;
-    at[1] = (float)from.y;
-    at[2] = (float)from.z;
+    vshi_vec_to_floats(vshi_sub(place, f->centre), at);
 }
 
-/* Whether memory allows for `bytes` more than the search holds. */
+/* Checks that memory allows `bytes` more than the search holds. */
 static vsh_result check_bytes(const finding *f, double bytes, vsh_error *error) {
     const seam_search *s = f->search;
     return vshi_check_limit(s->run, s->held + (double)s->room * sizeof *s->seams->list + bytes, what, error);
@@ -277,7 +265,7 @@ static vshi_vec end_of(const finding *f, uint32_t number) {
     return at[number % 2];
 }
 
-/* Notes an end that lies on the edge, and not at its ends. */
+/* Notes an end that lies on the edge, but not at its ends. */
 static bool note(void *user, uint32_t number) {
     finding *f = user;
     const vshi_vec along = vshi_sub(f->at[1], f->at[0]), from = vshi_sub(end_of(f, number), f->at[0]);
@@ -318,14 +306,14 @@ static vsh_result add_part(finding *f, part added, vsh_error *error) {
     return VSH_OK;
 }
 
-/* The parts of an edge, which is one where nothing lies on it. */
+/* Adds the parts of an edge: one if nothing lies on it. */
 static vsh_result cut_edge(finding *f, uint32_t edge, vsh_error *error) {
     float a[3], b[3];
     f->cut_count = f->looked = 0;
     places_of(f, edge, f->at);
     to_floats(f, f->at[0], a);
     to_floats(f, f->at[1], b);
-    vshi_places_along(&f->ends, a, b, (float)(4.0 * f->within), note, f); /* 32 bits know less */
+    vshi_places_along(&f->ends, a, b, (float)(4.0 * f->within), note, f); /* wider, for 32 bits */
     if (f->cut_count == MOST_CUTS || f->looked == MOST_LOOKED) {
         f->cut_count = 0;
     }
@@ -355,9 +343,9 @@ static int order_parts(const void *a, const void *b) {
 
 /* --- pairs */
 
-static void look_at_part(const finding *f, const part *p, edge_end ends[2]) {
+static void find_part_ends(const finding *f, const part *p, edge_end ends[2]) {
     edge_end whole[2];
-    look_at_edge(f->search->pages, p->edge, whole);
+    find_ends(f->search->pages, p->edge, whole);
     for (int k = 0; k < 2; ++k) {
         ends[k] = whole[0];
         ends[k].t = p->t[k];
@@ -365,11 +353,6 @@ static void look_at_part(const finding *f, const part *p, edge_end ends[2]) {
         ends[k].x += p->t[k] * (whole[1].x - whole[0].x);
         ends[k].y += p->t[k] * (whole[1].y - whole[0].y);
     }
-}
-
-static bool same_ends(const part *p, const part *q) {
-    return (is_same_place(p->at[0], q->at[0]) && is_same_place(p->at[1], q->at[1])) ||
-           (is_same_place(p->at[0], q->at[1]) && is_same_place(p->at[1], q->at[0]));
 }
 
 /* Compares parts with those before them. Whole edges have been compared. */
@@ -381,9 +364,11 @@ static vsh_result compare_parts(const finding *f, vsh_error *error) {
             const uint32_t pair[2] = {q->edge, p->edge};
             edge_end a[2], b[2];
             bool goes_on;
-            if ((p->cut || q->cut) && same_ends(p, q)) {
-                look_at_part(f, q, a);
-                look_at_part(f, p, b);
+            const bool turned = !is_same_place(p->at[0], q->at[0]);
+            if ((p->cut || q->cut) && is_same_place(p->at[0], q->at[turned]) &&
+                is_same_place(p->at[1], q->at[!turned])) {
+                find_part_ends(f, q, a);
+                find_part_ends(f, p, b);
                 VSHI_TRY(compare_pair(f->search, pair, a, b, &goes_on, error));
             }
         }
@@ -394,7 +379,7 @@ static vsh_result compare_parts(const finding *f, vsh_error *error) {
 static vsh_result find_parts(finding *f, vsh_error *error) {
     VSHI_TRY(list_edges(f, error));
     if (f->count == 0 || f->count > UINT32_MAX / 2) {
-        return VSH_OK; /* more are not numbered */
+        return VSH_OK; /* 32 bits number no more ends */
     }
     VSHI_TRY(list_ends(f, error));
     for (size_t i = 0; i < f->count; ++i) {
@@ -426,7 +411,7 @@ static vsh_result compare_parts_of_edges(seam_search *search, vsh_error *error) 
 
 enum { POLL_EDGES = 8192 /* between two looks at the cancel flag */ };
 
-/* Corners of all triangles, welded where they lie in one place in the world. */
+/* Corners of all triangles, welded if they lie in one place in the world. */
 typedef struct welded {
     vshi_vec *places;  /* [vertices] */
     uint32_t *weld;    /* [vertices] */
@@ -438,7 +423,7 @@ static void key_of(const void *user, size_t vertex, uint64_t key[VSHI_KEY_WORDS]
     memcpy(key, (const vshi_vec *)user + vertex, VSHI_KEY_WORDS * sizeof *key);
 }
 
-/* Triangles that cover nothing get no edges: their corners are one. */
+/* Triangles that cover nothing get no edges: all their corners are one. */
 static void place_mesh(seam_search *s, const vshi_charts *charts, size_t m, uint32_t triangle,
                        uint32_t vertex, welded *w) {
     const vsh_mesh *mesh = &charts->meshes[m];
@@ -480,8 +465,8 @@ static vsh_result compare_sides(seam_search *s, const uint32_t *sides, size_t co
             const uint32_t pair[2] = {sides[i], sides[k]};
             edge_end a[2], b[2];
             bool goes_on;
-            look_at_edge(s->pages, pair[0], a);
-            look_at_edge(s->pages, pair[1], b);
+            find_ends(s->pages, pair[0], a);
+            find_ends(s->pages, pair[1], b);
             VSHI_TRY(compare_pair(s, pair, a, b, &goes_on, error));
             if (goes_on) {
                 s->goes_on[pair[0]] = s->goes_on[pair[1]] = 1;
@@ -525,9 +510,9 @@ static vsh_result weld_and_compare(seam_search *s, vsh_error *error) {
     vshi_sorted_sides sides = {NULL, triangles, w.vertices, NULL};
     vsh_result result;
     VSHI_TRY_DONE(vshi_check_limit(s->run, bytes, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.places, w.vertices, sizeof *w.places, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.weld, w.vertices, sizeof *w.weld, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&w.corners, triangles, 3 * sizeof *w.corners, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(w.places, w.vertices), VSHI_ARRAY(w.weld, w.vertices),
+                                 VSHI_ARRAY(w.corners, 3 * triangles)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
     VSHI_TRY_DONE(weld(s, &w, error));
     sides.corners = w.corners;
     VSHI_TRY_DONE(vshi_sort_sides(&sides, error));
@@ -545,8 +530,8 @@ static vsh_result find_seams(seam_search *s, vsh_error *error) {
     vshi_seams *seams = s->seams;
     s->held = (double)triangles * (sizeof *seams->chart + 3.0 * sizeof *s->goes_on);
     VSHI_TRY(vshi_check_limit(s->run, s->held, what, error));
-    VSHI_TRY(vshi_allocate((void **)&seams->chart, triangles, sizeof *seams->chart, what, error));
-    VSHI_TRY(vshi_allocate((void **)&s->goes_on, 3 * triangles, sizeof *s->goes_on, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(seams->chart, triangles), VSHI_ARRAY(s->goes_on, 3 * triangles)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
     VSHI_TRY(weld_and_compare(s, error));
     VSHI_TRY(compare_parts_of_edges(s, error));
     for (size_t i = 0; i < triangles; ++i) {

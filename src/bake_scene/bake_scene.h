@@ -1,57 +1,36 @@
-/* A scene's bake under way, and its lightmaps, from charts to files: one for each page of a receiver. */
+/* A scene's bake under way: its lightmaps, their outputs, parts, warnings and errors. */
 #ifndef VSHI_BAKE_SCENE_H
 #define VSHI_BAKE_SCENE_H
 
 #include "bake/page.h"
-#include "base/store.h"
+#include "base/memory.h"
+#include "image/image.h"
 #include "mesh/mesh_set.h"
 
 #include <stdbool.h>
-#include <vdbshade/bake_scene.h>
+#include <string.h>
 #include <vdbshade/image.h>
-#include <vdbshade/provenance.h>
 #include <vdbshade/scene.h>
-
-/* --- lightmaps */
 
 /* One lightmap. */
 typedef struct vshi_target {
-    vsh_receiver receiver; /* the scene's, with this lightmap's output and size */
-    size_t index;          /* of the receiver in the scene */
-    const vsh_mesh *meshes;
-    size_t mesh_count;
-    char *output;      /* FILE.OBJECT.exr of an object, FILE.PAGE.exr of a page, or the receiver's own */
-    vshi_mesh_set set; /* the set that holds the meshes */
-    size_t page;       /* of the receiver */
-    bool unwrapped;    /* its UVs are new, or packed again */
+    vsh_scene_lightmap *lightmap; /* for the caller */
+    size_t index;                 /* among the targets */
+    vsh_receiver receiver;        /* the scene's, with this lightmap's output, size and seams */
+    vsh_charts *charts;           /* NULL before they are counted */
+    bool unwrapped;               /* its UVs are new, or packed again */
     char *object;      /* the object's name in files, unique among the lightmaps; NULL: several objects */
+    char *output;      /* FILE.OBJECT.exr of an object, FILE.PAGE.exr of a page, or the receiver's own */
+    vshi_mesh_set set; /* of meshes that do not cast */
 } vshi_target;
 
-typedef struct vshi_targets {
-    vshi_target *list; /* [count] */
-    size_t count;
-} vshi_targets;
+enum { VSHI_LIT_PLANES = 4 };
 
-/* The name of a target's file: FILE.OBJECT.exr for an object, FILE.PAGE.exr for one of several `pages`, else
- * FILE.exr. To be freed; NULL if out of memory. */
-char *vshi_target_file(const vshi_target *target, size_t pages, const char *file);
-
-/* Finds what is solid of receivers that do not cast. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. Free them also after a failure. */
-vsh_result vshi_targets_make(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
-                             vshi_targets *targets, vsh_error *error);
-void vshi_targets_free(vshi_targets *targets);
-
-/* A receiver's image, of its bits, packing and colours. */
-vsh_image_options vshi_receiver_image(const vsh_receiver *receiver);
-
-/* --- the bake */
-
-/* A page that goes into an asset, kept until the receiver's other pages are baked. */
+/* A page of an asset, kept until the receiver's other pages are baked. */
 typedef struct vshi_lit_page {
     int32_t width, height;
-    const char *object; /* its name; NULL: several objects */
-    float *planes[4];   /* AO; light: R, G and B, or one; NULL: none */
+    const char *object;             /* its name; NULL: several objects */
+    float *planes[VSHI_LIT_PLANES]; /* AO; light: R, G and B, or one; NULL: none */
 } vshi_lit_page;
 
 /* The objects that a light or the sky reaches. */
@@ -65,13 +44,13 @@ typedef struct vshi_scene_bake {
     vsh_bake_options options;
     vsh_run run; /* resolved */
     vsh_assets *assets;
-    vshi_targets targets;
-    vsh_scene_lightmap *lightmaps; /* [targets.count] */
-    vsh_charts **charts;           /* [targets.count]; NULL before they are counted */
-    double receivers[2][3];        /* world box of all samples, min and max; min > max: none, or not needed */
+    vshi_target *targets; /* [target_count] */
+    size_t target_count;
+    vsh_scene_lightmap *lightmaps; /* [target_count] */
+    double receivers[2][3];        /* world box of all samples, min and max; min > max: none */
     vsh_occluders *occluders;      /* NULL in merges */
     bool layered_ao;               /* layers take part in AO, so texels do not share its rays */
-    struct vshi_tracer *tracer;    /* NULL in merges */
+    vshi_tracer *tracer;           /* NULL in merges */
     vsh_provenance *provenance;    /* NULL if the caller receives the rows */
     vsh_bake_error *errors;        /* [error_count]: of each light, of AO, of the sky */
     size_t error_count;
@@ -85,10 +64,13 @@ typedef struct vshi_scene_bake {
 /* Finds the provenance of the outputs, once the occluders are known. */
 vsh_result vshi_bake_find_provenance(vshi_scene_bake *bake, vsh_error *error);
 
-/* Adds a lightmap's results to the report. */
-void vshi_bake_report_add(vshi_scene_bake *bake, const vsh_bake_stats *baked);
+/* Adds the file's name to an error of a function that knows arrays only. Returns `result`. */
+vsh_result vshi_name_file(const char *path, vsh_result result, vsh_error *error);
 
-/* --- the channels of lightmaps: which there are, in which order, and the planes that a bake fills */
+/* The folder of a path, to be freed; NULL if out of memory. */
+char *vshi_copy_folder(const char *path);
+
+/* --- channels (outputs.c) */
 
 typedef struct vshi_channels {
     vsh_image image;       /* their names, in the order of bake/planes.c; A is the last. No planes */
@@ -96,14 +78,14 @@ typedef struct vshi_channels {
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
     int32_t *holds;
-    float **values;     /* [value_count][height][width][components]: of the store */
+    float **values;     /* [value_count]: [height][width][components] of the store */
     size_t *components; /* [value_count]: 1 or 3 channels each */
     size_t value_count;
     vshi_store *store; /* NULL: there is no memory for values */
 } vshi_channels;
 
-/* Names the channels of a scene at a size, without memory for values: enough for vsh_image_check(). Errors:
- * VSH_ERROR_ARGUMENT (more than VSH_MAX_CHANNELS), VSH_ERROR_MEMORY. Free them also after a failure. */
+/* Names the channels of a scene at a size, without memory for values. Errors: VSH_ERROR_ARGUMENT (more than
+ * VSH_MAX_CHANNELS), VSH_ERROR_MEMORY. Free them also after a failure. */
 vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t height, vshi_channels *channels,
                               vsh_error *error);
 
@@ -111,111 +93,140 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, vshi_store *store,
                                   const char *output, vsh_error *error);
 
-/* Which planes a scene's bake fills, and how: those that are not NULL, which are none to be written to. */
+/* The planes that a scene's bake fills are not NULL here. They cannot be written to. */
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
 
-/* Memory that vshi_channels_rows() takes for so many rows, to be freed. Errors: VSH_ERROR_MEMORY. */
+/* Allocates the memory of vshi_channels_rows() for so many rows, to be freed. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
                                        vsh_error *error);
 
-/* Rows of all channels, planes[image.channel_count][rows][width]. */
+/* Lists rows of all channels, planes[image.channel_count][rows][width]. */
 void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
                         const float **planes);
 
-void vshi_channels_free(vshi_channels *channels); /* zeroed ones too */
+void vshi_channels_free(vshi_channels *channels); /* also zeroed ones */
 
-/* --- pages */
+/* --- pages (bake_scene.c) */
 
-/* One lightmap. */
+/* A lightmap in memory. */
 typedef struct vshi_scene_page {
     vshi_scene_bake *bake;
     const vshi_target *target;
-    size_t index; /* of the target */
-    const vsh_charts *charts;
-    vsh_scene_lightmap *lightmap;
     vshi_channels channels;
     vshi_page page;
     vsh_bake_stats baked;
 } vshi_scene_page;
 
-/* Takes memory for a lightmap. Close it also after an error. Errors: as vshi_store_take(). */
-vsh_result vshi_scene_page_open(vshi_scene_bake *bake, size_t index, vshi_store *store, vshi_scene_page *page,
-                                vsh_error *error);
-void vshi_scene_page_close(vshi_scene_page *page);
-
-/* A store for lightmap `index`, whose files lie beside its output. `run` must outlive it. Close it with
- * vshi_scene_store_close(). Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_scene_store_open(const vshi_scene_bake *bake, size_t index, vsh_run *run, vshi_store *store,
-                                 vsh_error *error);
-void vshi_scene_store_close(vshi_store *store);
-
-/* Bytes that the lightmaps held together take, at most. */
-double vshi_bake_bytes(const vshi_scene_bake *bake);
-
-/* Bakes lightmaps, or reads them from parts, finishes and writes them. Lightmaps whose seams are fixed
- * stay in memory together. Errors: as vsh_bake_scene(). */
-vsh_result vshi_bake_pages(vshi_scene_bake *bake, vsh_error *error);
-
-/* Adds the file's name to an error of a function that knows arrays only. Returns `result`. */
-vsh_result vshi_name_file(const char *path, vsh_result result, vsh_error *error);
-
-/* --- a receiver's own file, written with its light in the materials */
-
-typedef struct vshi_lit_output {
+/* Lightmaps in a row that are in memory together. */
+typedef struct vshi_page_group {
     vshi_scene_bake *bake;
-    const vshi_target *target;
-    const vsh_scene_lightmap *lightmap;
-    vshi_lit_page page;    /* the current one; the bake keeps it when it is complete */
-    int32_t rows;          /* received so far */
-    vsh_image_writer *exr; /* an EXR of all channels; NULL: not asked for */
-    char *exr_path;
-    int32_t first_source[4]; /* each plane is the mean of so many channels from this one on */
-    int32_t source_count[4];
-} vshi_lit_output;
+    vsh_run held; /* the bake's run, with the memory used beside the pages */
+    vshi_store store;
+    vshi_scene_page *pages; /* [count], of which `open` are open */
+    size_t count, open;
+} vshi_page_group;
 
-/* Ambient light, linear, of an asset whose scene names none: shadows are not black. */
-#define VSHI_LIT_AMBIENT 0.25
+/* Takes memory for `count` lightmaps. Planes without room lie in files beside the first one's output. Close
+ * the group also after an error. Errors: as vshi_store_take(). */
+vsh_result vshi_page_group_open(vshi_scene_bake *bake, size_t first, size_t count, vshi_page_group *group,
+                                vsh_error *error);
+void vshi_page_group_close(vshi_page_group *group); /* also zeroed ones */
 
-/* Adds irradiance and ambient light to a scene whose outputs are all assets. */
-void vshi_lit_output_scene(vsh_scene *scene);
+/* --- outputs */
 
-/* Whether an asset can be written with these channels. Errors: as vsh_receiver_check(). */
-vsh_result vshi_lit_output_check(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error);
+/* Lists the lightmaps of all receivers as targets. Finds which meshes are solid of receivers that do not
+ * cast. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_list_lightmaps(vshi_scene_bake *bake, vsh_error *error);
 
-/* Whether the receivers' files have room for the UVs of their new atlases; before anything is baked. Errors:
- * as vsh_lit_check_uvs(). */
-vsh_result vshi_lit_check_uvs(vshi_scene_bake *bake, vsh_error *error);
+/* A receiver's image, with its bits, packing and colours. */
+vsh_image_options vshi_receiver_image(const vsh_receiver *receiver);
 
-/* Takes memory for a page. Close it also after an error. */
-vsh_result vshi_lit_output_open(vshi_lit_output *lit, const vshi_scene_page *page, vsh_error *error);
+/* Checks that assets have room for the UVs of their new atlases. Errors: as vshi_lit_check_free_set(). */
+vsh_result vshi_check_assets(const vshi_scene_bake *bake, vsh_error *error);
 
-/* Adds the next rows of all channels. */
-vsh_result vshi_lit_output_add(vshi_lit_output *lit, int32_t rows, const float *const *planes,
-                               vsh_error *error);
-
-/* Keeps the page, and writes the asset with the receiver's last one. */
-vsh_result vshi_lit_output_finish(vshi_lit_output *lit, vsh_error *error);
-void vshi_lit_output_close(vshi_lit_output *lit); /* zeroed ones too */
+/* Writes a finished page: its image, its picture of invalid texels, and with a receiver's last page its
+ * asset. Hands its rows to the caller instead if wanted. */
+vsh_result vshi_write_page(const vshi_scene_page *page, vsh_error *error);
 
 /* Frees the pages that wait for others. */
 void vshi_lit_pages_free(vshi_scene_bake *bake);
 
-/* --- warnings and errors about a lightmap's UVs, texels and file */
+/* --- parts: each file holds every N-th tile, as vshi_trace_tiles() left it
+ *
+ * A file is: vshi_part_front; the head (inputs, options, texts); the tiles; a checksum. It appears whole or
+ * not at all, and holds no time and no name of a machine. Readers check all of it. */
+
+/* The format's number is in the magic, in base 36: another one is another version's. */
+#define VSHI_PART_MAGIC "vdbshade part A\n"
+#define VSHI_PART_MAGIC_BEGIN "vdbshade part "
+#define VSHI_PART_ORDER UINT64_C(0x0102030405060708)
+#define VSHI_PART_SUM UINT64_C(0xcbf29ce484222325) /* of no bytes */
+
+enum { VSHI_MOST_SHARDS = 10000 };
+
+/* Before the head. Numbers have the byte order of the machine that wrote them, which `order` shows. */
+typedef struct vshi_part_front {
+    char magic[16];
+    uint64_t order;
+    uint64_t head_bytes; /* a multiple of 8; the tiles follow, then the checksum's 8 bytes */
+} vshi_part_front;
+
+/* Begins a tile. Its statistics and the errors of channels follow, then its texels, array by array, then the
+ * texels to compare with the casters. */
+typedef struct vshi_part_tile {
+    uint32_t lightmap, tile;
+    uint32_t held[2]; /* texels of AO, of the sky */
+} vshi_part_tile;
+
+/* FNV-1a (Fowler, Noll and Vo, 1991), a word of four bytes at a time. */
+static inline uint64_t vshi_part_sum(uint64_t sum, const void *bytes, size_t size) {
+    const unsigned char *at = bytes;
+    for (size_t i = 0; i + 4 <= size; i += 4) {
+        uint32_t word;
+        memcpy(&word, at + i, 4);
+        sum = (sum ^ word) * UINT64_C(0x100000001b3);
+    }
+    return sum;
+}
+
+/* Numbers the tiles with texels over all lightmaps in one sequence. Shard I of N traces tiles I, I + N, I +
+ * 2N … of them, and writes them into its part. Errors: as vsh_bake_scene(). */
+vsh_result vshi_bake_part(vshi_scene_bake *bake, vsh_error *error);
+
+/* The parts of a merge. */
+typedef struct vshi_parts vshi_parts;
+void vshi_parts_free(vshi_parts *parts); /* NULL does nothing */
+
+/* Counts the parts of a merge, and checks that none is missing. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT,
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_parts_find(const vshi_scene_bake *bake, int32_t *count, vsh_error *error);
+
+/* Opens the parts as bake->parts, once the charts are counted, and checks that they belong to this scene.
+ * Sets the report's occluders, and the provenance. Errors: VSH_ERROR_READ (a part is missing),
+ * VSH_ERROR_INPUT (a part is damaged, or of other inputs, options or another version), VSH_ERROR_LIMIT,
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_parts_open(vshi_scene_bake *bake, int32_t count, vsh_error *error);
+
+/* Reads the tiles of a lightmap, in place of vshi_trace_tiles(). Lightmaps come in their order. `job` counts
+ * tiles. Errors: VSH_ERROR_READ, VSH_ERROR_INPUT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_parts_read(vshi_parts *parts, vshi_scene_page *page, vshi_job *job, vsh_error *error);
+
+/* --- warnings and errors */
 
 /* Warns of faults in the target's UVs, one line for each mesh and kind. Warns of charts that lie too close
  * for the size, and of charts that cover few texels. */
 void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
                    const vsh_run *run);
 
-/* Charts that cover no texel's centre, or objects that lie over each other on more than VSH_LARGEST_OVERLAP
- * of the texels: VSH_ERROR_INPUT, with why. */
+/* VSH_ERROR_INPUT if charts cover no texel's centre, or objects overlap on more than VSH_LARGEST_OVERLAP of
+ * the texels. */
 vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
                            vsh_error *error);
 
-/* A lightmap without one valid texel is no lightmap: VSH_ERROR_INPUT. */
+/* VSH_ERROR_INPUT if a lightmap has no valid texel. */
 vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *baked, vsh_error *error);
 
-/* Notes texels that are not valid, and warns of marches that did not end or widened too far. */
+/* Notes invalid texels, and warns of marches that did not end or widened too far. */
 void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
                      const vsh_run *run);
 

@@ -1,55 +1,55 @@
+/* Warnings and errors about lightmaps: their UVs, texels and files, and lights that one object hides. */
 #include "bake_scene/bake_scene.h"
 
 #include "bake/planes.h"
 #include "bake/texels.h"
 #include "base/job.h"
 #include "light/light.h"
-#include "light/view.h"
 #include "mesh/solidity.h"
+#include "scene/assets.h"
 #include "trace/embree.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
-#include <vdbshade/bake_scene.h>
 
 /* --- UVs */
 
-static const char *name_of(const vsh_mesh *mesh) {
+static const char *find_name(const vsh_mesh *mesh) {
     return mesh->name != NULL ? mesh->name : "";
 }
 
-static const char *object_of(const vsh_mesh *mesh) {
-    return mesh->object_name != NULL ? mesh->object_name : name_of(mesh);
+static const char *find_object(const vsh_mesh *mesh) {
+    return mesh->object_name != NULL ? mesh->object_name : find_name(mesh);
 }
 
-/* Where some charts lie over others, that has been told. */
+/* Warns of charts closer than a texel, unless charts overlap: then a warning says so. */
 static void warn_close(const vshi_target *target, const vsh_uv_report *reports, const vsh_run *run) {
     const vsh_receiver *receiver = &target->receiver;
-    for (size_t m = 0; m < target->mesh_count; ++m) {
+    for (size_t m = 0; m < target->lightmap->mesh_count; ++m) {
         if (reports[m].overlap_texels > 0) {
             return;
         }
     }
     vsh_run silent = *run;
     silent.warning = NULL;
-    vsh_closeness close;
-    if (vsh_charts_closeness(target->meshes, target->mesh_count, receiver->width, receiver->height, &silent,
-                             &close, NULL) != VSH_OK ||
+    vshi_closeness close;
+    if (vshi_charts_closeness(target->lightmap->meshes, target->lightmap->mesh_count, receiver->width,
+                              receiver->height, &silent, &close, NULL) != VSH_OK ||
         close.texels == 0) {
-        return; /* no more than a hint: nothing is refused for the want of it */
+        return; /* a failure is not worth an error: this is only a hint */
     }
     const double larger = receiver->width > receiver->height ? receiver->width : receiver->height;
     const double apart = close.gap > 0.0 ? ceil(larger / close.gap) : INFINITY;
-    char help[128] = "they touch, so no size parts them; unwrap with a margin";
+    char help[128] = "they touch at every size; unwrap with a margin";
     if (apart <= VSH_MAX_LIGHTMAP_SIZE) {
         snprintf(help, sizeof help, "from --size %.0f on they are apart", apart);
     }
     vshi_warn(run,
               "%s: charts lie closer than a texel to each other along %" PRIu64 " texels, %" PRIu64
               " of them of mesh '%s': values bleed between them; %s",
-              receiver->path, close.texels, close.mesh_texels, name_of(&target->meshes[close.mesh]), help);
+              receiver->path, close.texels, close.mesh_texels,
+              find_name(&target->lightmap->meshes[close.mesh]), help);
 }
 
 /* The target's size, doubled until it has grown by `least_factor`. */
@@ -66,12 +66,13 @@ static void name_size(const vshi_target *target, double least_factor, char *text
 
 static void warn_covered(const vshi_target *target, uint64_t covered, const vsh_run *run) {
     static const double least = 0.2;
-    static const double full = 0.6; /* the share that charts cover of a page without padding, about */
+    static const double full = 0.6; /* typical share of charts on a page without padding */
     const vsh_receiver *receiver = &target->receiver;
     const double share = (double)covered / ((double)receiver->width * (double)receiver->height);
     const bool chosen = receiver->objects.only_count > 0 || receiver->objects.except_count > 0;
-    if (share >= least || (chosen && !target->unwrapped) || (target->page > 0 && target->object == NULL)) {
-        return; /* other objects fill the rest of the layout; the last page need not be full */
+    if (share >= least || (chosen && !target->unwrapped) ||
+        (target->lightmap->page > 0 && target->object == NULL)) {
+        return; /* other objects fill the rest, or it is the last page, which need not be full */
     }
     char help[128], size[40];
     if (!target->unwrapped) {
@@ -92,8 +93,8 @@ static void warn_covered(const vshi_target *target, uint64_t covered, const vsh_
 
 void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
                    const vsh_run *run) {
-    for (size_t m = 0; m < target->mesh_count; ++m) {
-        vshi_warn_mesh_uvs(target->receiver.path, &target->meshes[m], m, &reports[m], run);
+    for (size_t m = 0; m < target->lightmap->mesh_count; ++m) {
+        vshi_warn_mesh_uvs(target->receiver.path, &target->lightmap->meshes[m], m, &reports[m], run);
     }
     if (run->warning != NULL && target->receiver.type != VSH_RECEIVER_HEIGHTFIELD) { /* that is one chart */
         warn_close(target, reports, run);
@@ -104,8 +105,8 @@ void vshi_warn_uvs(const vshi_target *target, const vsh_uv_report *reports, uint
 static vsh_result refuse_empty(const vshi_target *target, const vsh_uv_report *reports, vsh_error *error) {
     const vsh_receiver *receiver = &target->receiver;
     size_t triangles = 0, outside = 0, flat = 0;
-    for (size_t m = 0; m < target->mesh_count; ++m) {
-        triangles += target->meshes[m].triangle_count;
+    for (size_t m = 0; m < target->lightmap->mesh_count; ++m) {
+        triangles += target->lightmap->meshes[m].triangle_count;
         outside += reports[m].outside_triangles;
         flat += reports[m].degenerate_triangles;
     }
@@ -118,7 +119,6 @@ static vsh_result refuse_empty(const vshi_target *target, const vsh_uv_report *r
                            : "raise --size, or unwrap it anew");
 }
 
-/* Objects that each fill a unit square of their own are not one lightmap, whatever its size. */
 vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *reports, uint64_t covered,
                            vsh_error *error) {
     if (covered == 0) {
@@ -128,7 +128,7 @@ vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *repor
     const vsh_uv_report *worst = reports;
     uint64_t texels = 0;
     size_t count = 0;
-    for (size_t i = 0; i < target->mesh_count; ++i) {
+    for (size_t i = 0; i < target->lightmap->mesh_count; ++i) {
         texels += reports[i].other_texels;
         count += reports[i].other_texels > 0;
         worst = reports[i].other_texels > worst->other_texels ? &reports[i] : worst;
@@ -139,76 +139,47 @@ vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *repor
     return vshi_fail(
         error, VSH_ERROR_INPUT,
         "%s: objects share texels of the lightmap: %zu of %zu meshes lie over others, on %" PRIu64
-        " texels (%" PRIu64 " are covered at all); '%.100s' on %zu, %zu of them over '%.100s': "
-        "give each object an image of its own (--per-object), choose some (--receive NAME), or "
-        "unwrap them together into one atlas (in Blender: select all, edit mode, UV > Smart UV "
-        "Project); \"allow_overlap\": true of a scene's receiver bakes it as it is",
-        receiver->path, count, target->mesh_count, texels, covered,
-        object_of(&target->meshes[worst - reports]), worst->other_texels, worst->other_mesh_texels,
-        object_of(&target->meshes[worst->other_mesh]));
+        " texels (charts cover %" PRIu64 "); '%.100s' on %zu, %zu of them over '%.100s'. "
+        "-o FILE.glb, or --unwrap auto with an image, makes one atlas with texels of its own for each "
+        "object; --per-object gives each object an image; --receive NAME chooses some objects; "
+        "\"allow_overlap\": true in a scene's receiver bakes the UVs as they are",
+        receiver->path, count, target->lightmap->mesh_count, texels, covered,
+        find_object(&target->lightmap->meshes[worst - reports]), worst->other_texels,
+        worst->other_mesh_texels, find_object(&target->lightmap->meshes[worst->other_mesh]));
 }
 
 /* --- baked texels */
 
-enum { WORST = 3 }; /* meshes that are named */
-
-/* " 'floor' 1200, 'walls' 300 and 4 others", those with the most texels first. */
-static void name_worst(const vshi_target *target, const uint64_t *invalid, char *text, size_t size) {
-    size_t worst[WORST], named = 0, others = 0, at = 0;
-    for (size_t m = 0; m < target->mesh_count; ++m) {
-        others += invalid[m] > 0;
-        size_t place = named;
-        for (; place > 0 && invalid[worst[place - 1]] < invalid[m]; --place) {
-            if (place < WORST) {
-                worst[place] = worst[place - 1];
-            }
-        }
-        if (invalid[m] > 0 && place < WORST) {
-            worst[place] = m;
-            named += named < WORST;
-        }
-    }
-    text[0] = '\0';
-    for (size_t k = 0; k < named && at < size; ++k) {
-        const char *name = target->meshes[worst[k]].name;
-        at += (size_t)snprintf(text + at, size - at, "%s'%s' %" PRIu64, k > 0 ? ", " : "",
-                               name != NULL ? name : "", invalid[worst[k]]);
-    }
-    if (others > named && at < size) {
-        snprintf(text + at, size - at, " and %zu more", others - named);
-    }
-}
-
 static void note_invalid(const vshi_target *target, const vsh_bake_stats *baked, bool traced,
                          const vsh_run *run) {
-    char names[512];
+    const uint64_t *invalid = baked->invalid_by_mesh;
     const char *by = traced ? "" : "voxels decide, and --method exact is sharper; ";
-    name_worst(target, baked->invalid_by_mesh, names, sizeof names);
+    size_t worst = 0;
+    for (size_t m = 1; m < target->lightmap->mesh_count; ++m) {
+        worst = invalid[m] > invalid[worst] ? m : worst;
+    }
     vshi_note(run,
-              "%s: %" PRIu64 " of %" PRIu64 " texels are invalid (inside a solid or behind a wall): %s; %s"
-              "--invalid FILE.png shows where",
-              target->receiver.path, baked->invalid_texels, baked->texels, names, by);
-}
-
-/* Whether values are what cones read, and no rays refine them. */
-static bool cones_decide(const vsh_scene *scene) {
-    return (scene->light_count > 0 &&
-            (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) == 0) ||
-           (scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) == 0);
+              "%s: %" PRIu64 " of %" PRIu64 " texels are invalid (inside a solid or behind a wall), %" PRIu64
+              " of them of mesh '%s'; %s--invalid FILE.png shows where",
+              target->receiver.path, baked->invalid_texels, baked->texels, invalid[worst],
+              find_name(&target->lightmap->meshes[worst]), by);
 }
 
 void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
                      const vsh_run *run) {
     const char *path = target->receiver.path;
     const vsh_shade_stats *shade = &baked->shade;
+    const bool shadow_rays = (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    const bool ao_rays = (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
+    const bool cones_decide = (scene->light_count > 0 && !shadow_rays) || (scene->ao && !ao_rays);
     if (baked->invalid_texels > 0) {
-        note_invalid(target, baked, vsh_scene_marches(scene, NULL) == 0, run);
+        note_invalid(target, baked, vshi_scene_marches(scene, NULL) == 0, run);
     }
     if (shade->unfinished > 0) {
         vshi_warn(run, "%s: %" PRIu64 " of %" PRIu64 " marches ran out of %d steps; use larger voxels", path,
                   shade->unfinished, shade->marches, scene->shade.max_steps);
     }
-    if (shade->beyond_reach > 0 && cones_decide(scene)) {
+    if (shade->beyond_reach > 0 && cones_decide) {
         vshi_warn(run,
                   "%s: %" PRIu64 " of %" PRIu64
                   " cones grew wider than the field reaches, so far shadows may be too "
@@ -223,8 +194,8 @@ vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *
     }
     return vshi_fail(error, VSH_ERROR_INPUT,
                      "%s: nothing to bake: all %" PRIu64
-                     " texels are inside solids or behind walls; 'vdbshade info' tells what is taken "
-                     "for solid; is it to receive at all, or does what surrounds it cast?",
+                     " texels are inside solids or behind walls; 'vdbshade info' lists the solids; leave "
+                     "this mesh out (--no-receive NAME), or the solid around it (--no-cast NAME)",
                      target->receiver.path, baked->texels);
 }
 
@@ -240,15 +211,15 @@ void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const
 
 /* --- hidden lights */
 
-/* Warns of a light that one object hides from all others: a sky dome hides the sun, a bulb its own lamp. The
- * shadow planes show which lights are hidden. Rays then find the object. */
+/* One object may hide a light from all others: a sky dome hides the sun, a bulb its own lamp. The shadow
+ * planes show which lights are hidden. Rays then find the object. */
 enum { POINTS = 64 /* on each mesh */, RAYS = 16 /* from a point to a light */ };
 
 static bool is_same(const vsh_mesh *a, const vsh_mesh *b) {
-    return strcmp(object_of(a), object_of(b)) == 0;
+    return strcmp(find_object(a), find_object(b)) == 0;
 }
 
-/* Notes what reaches a texel of a mesh. */
+/* Notes the lights that reach a texel of a mesh. */
 static void note_texel(const vshi_scene_page *page, size_t texel, const vsh_mesh *mesh) {
     const vsh_lightmap *planes = &page->channels.lightmap;
     const size_t lights = page->bake->scene.light_count;
@@ -266,12 +237,12 @@ void vshi_note_lit(const vshi_scene_page *page) {
     for (size_t i = 0; i < page->page.width * page->page.height; ++i) {
         const uint32_t mesh = page->page.mesh[i];
         if (mesh > 0 && page->channels.lightmap.coverage[i] == 1.0f) {
-            note_texel(page, i, &page->target->meshes[mesh - 1]);
+            note_texel(page, i, &page->target->lightmap->meshes[mesh - 1]);
         }
     }
 }
 
-static bool is_in_box(const vsh_triangles *triangles, const double at[3]) {
+static bool is_in_box(const vshi_triangles *triangles, const double at[3]) {
     double low[3], high[3], beyond = 0.0;
     vshi_triangles_bounds(triangles, low, high);
     for (int k = 0; k < 3; ++k) {
@@ -290,12 +261,12 @@ static bool is_facing(const vshi_vec corner[3], vshi_vec at, const vsh_light *li
 
 /* Whether an object hides a light from all other receivers. Either the lamp or the receivers are in its box:
  * a crate may lie in the shade of a wall, and a house that holds both has several rooms. */
-static bool hides_light(const vsh_mesh *own, size_t parts, vsh_triangles **triangles, const vsh_light *light,
-                        const vshi_targets *targets, const vsh_run *run) {
+static bool hides_light(const vsh_mesh *own, size_t parts, vshi_triangles **triangles, const vsh_light *light,
+                        const vshi_scene_bake *bake, const vsh_run *run) {
     size_t facing = 0;
-    for (size_t t = 0; t < targets->count; ++t) {
-        for (size_t m = 0; m < targets->list[t].mesh_count; ++m) {
-            const vsh_mesh *mesh = &targets->list[t].meshes[m];
+    for (size_t t = 0; t < bake->target_count; ++t) {
+        for (size_t m = 0; m < bake->lightmaps[t].mesh_count; ++m) {
+            const vsh_mesh *mesh = &bake->lightmaps[t].meshes[m];
             const size_t most = is_same(mesh, own) ? 0 : POINTS;
             const size_t count = mesh->triangle_count < most ? mesh->triangle_count : most;
             for (size_t k = 0; k < count; ++k) {
@@ -307,12 +278,12 @@ static bool hides_light(const vsh_mesh *own, size_t parts, vsh_triangles **trian
                 if (!is_facing(corner, p, light)) {
                     continue;
                 }
-                if (*triangles == NULL && vsh_triangles_create(own, parts, run, triangles, NULL) != VSH_OK) {
+                if (*triangles == NULL && vshi_triangles_create(own, parts, run, triangles, NULL) != VSH_OK) {
                     return false; /* no bake fails for a hint */
                 }
                 const bool lamp =
                     light->type != VSH_LIGHT_DIRECTIONAL && is_in_box(*triangles, light->position);
-                vsh_trace_shadow(*triangles, NULL, 1, at, NULL, 0.0, light, RAYS, run, &seen, NULL);
+                vshi_trace_shadow(*triangles, NULL, 1, at, NULL, 0.0, light, RAYS, run, &seen, NULL);
                 if (seen > 0.0f || is_in_box(*triangles, at) == lamp) {
                     return false;
                 }
@@ -323,10 +294,11 @@ static bool hides_light(const vsh_mesh *own, size_t parts, vsh_triangles **trian
     return facing > 0;
 }
 
-static void look_at(const vshi_scene_bake *bake, const vsh_mesh *own, size_t parts, const vsh_run *run) {
+static void find_hidden_lights(const vshi_scene_bake *bake, const vsh_mesh *own, size_t parts,
+                               const vsh_run *run) {
     const size_t lights = bake->scene.light_count;
-    const char *name = object_of(own);
-    vsh_triangles *triangles = NULL;
+    const char *name = find_object(own);
+    vshi_triangles *triangles = NULL;
     vsh_light zenith = vsh_light_default();
     vsh_run quiet = *run;
     quiet.progress = NULL;
@@ -339,12 +311,12 @@ static void look_at(const vshi_scene_bake *bake, const vsh_mesh *own, size_t par
         /* the sun may shine on a dome from outside; a lamp that lights its room is not hidden */
         const bool lights_own = light->type == VSH_LIGHT_DIRECTIONAL && lit != NULL && is_same(lit, own);
         if (!bake->lit[i].several && (lit == NULL || lights_own) &&
-            hides_light(own, parts, &triangles, light, &bake->targets, &quiet)) {
+            hides_light(own, parts, &triangles, light, bake, &quiet)) {
             vshi_warn(run, "'%s' hides %s%s from all other objects; --no-cast '%s' lets it through", name,
                       i < lights ? "light " : "the sky", i < lights ? light->name : "", name);
         }
     }
-    vsh_triangles_free(triangles);
+    vshi_triangles_free(triangles);
 }
 
 void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run) {
@@ -359,7 +331,7 @@ void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run) {
         for (size_t first = 0, next; first < count; first = next) {
             for (next = first + 1; next < count && is_same(&meshes[next], &meshes[first]); ++next) {
             }
-            look_at(bake, &meshes[first], next - first, run);
+            find_hidden_lights(bake, &meshes[first], next - first, run);
         }
     }
 }

@@ -1,4 +1,4 @@
-/* Bytes: how many as text, and the numbers that they are. */
+/* Bytes: sizes as text, numbers in binary files, hashing. */
 #ifndef VSHI_BYTES_H
 #define VSHI_BYTES_H
 
@@ -9,7 +9,7 @@
 
 enum { VSHI_BYTES_ROOM = 32 };
 
-/* "1.5 GiB", into text[capacity], which is returned. */
+/* Writes a size into text[capacity], "1.5 GiB", and returns it. */
 static inline const char *vshi_bytes_text(uint64_t bytes, char *text, size_t capacity) {
     static const char *const units[] = {"bytes", "KiB", "MiB", "GiB", "TiB"};
     double value = (double)bytes;
@@ -22,7 +22,15 @@ static inline const char *vshi_bytes_text(uint64_t bytes, char *text, size_t cap
     return text;
 }
 
-/* An unsigned number of 1, 2, 4 or 8 bytes in a binary file. */
+/* The finaliser of SplitMix64 (Steele, Lea and Flood, "Fast splittable pseudorandom number generators",
+ * 2014): mixes bits for hash tables. */
+static inline uint64_t vshi_mix(uint64_t x) {
+    x = (x ^ (x >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+    x = (x ^ (x >> 27)) * UINT64_C(0x94d049bb133111eb);
+    return x ^ (x >> 31);
+}
+
+/* Reads an unsigned number of 1, 2, 4 or 8 bytes of a binary file. */
 static inline uint64_t vshi_bytes_number(const char *at, int size, bool big_endian) {
     uint64_t value = 0;
     for (int i = 0; i < size; ++i) {
@@ -31,15 +39,15 @@ static inline uint64_t vshi_bytes_number(const char *at, int size, bool big_endi
     return value;
 }
 
-/* A whole number of them, perhaps signed; of 8 bytes at most INT64_MAX. */
+/* Reads a whole number, perhaps signed; one of 8 bytes is at most INT64_MAX. */
 static inline int64_t vshi_bytes_integer(const char *at, int size, bool is_signed, bool big_endian) {
     const uint64_t bits = vshi_bytes_number(at, size, big_endian), sign = UINT64_C(1) << (8 * size - 1);
     return is_signed && (bits & sign) != 0 ? (int64_t)bits - (int64_t)(2 * sign) : (int64_t)bits;
 }
 
-/* Bytes, at most, that reading a text takes: its own, Jansson's tree of it, and what is made of that. Objects
- * and arrays bring the first slots of their tables; members and items double them. (The C library's blocks
- * counted, Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene.c.) */
+/* Estimates the bytes that reading a JSON text takes at most: the text, Jansson's tree, and what the caller
+ * makes of it. Objects and arrays begin with some slots; members and items double them. (Blocks of the C
+ * library counted with Jansson 2.14 and glibc 2.36 on 64 bits: tests/unit/test_scene.c.) */
 static inline double vshi_json_bytes(const char *text, size_t size) {
     double objects = 0.0, arrays = 0.0, members = 0.0, items = 0.0;
     bool in_string = false;

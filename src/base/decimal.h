@@ -1,5 +1,5 @@
-/* Numbers in text, as every locale writes them in files: read exactly, written so that they read back as the
- * same bits. */
+/* Numbers in text, independent of the locale: read exactly, written so that they read back as the same bits.
+ */
 #ifndef VSHI_DECIMAL_H
 #define VSHI_DECIMAL_H
 
@@ -12,19 +12,19 @@
 extern "C" {
 #endif
 
-enum { VSHI_DECIMAL_ROOM = 32 }; /* what any number takes as text */
+enum { VSHI_DECIMAL_ROOM = 32 }; /* bytes that are enough for any number */
 
-/* The number that text … end - 1 is, all of it: [+-]digits[.digits][e[+-]digits], correctly rounded, or nan,
- * inf and infinity in any case. False where it is none. */
+/* Reads all of text … end - 1 as a number: [+-]digits[.digits][e[+-]digits], correctly rounded, or nan, inf
+ * or infinity in any case. Returns false if it is not a number. */
 bool vshi_decimal_read(const char *text, const char *end, double *value);
 
-/* The number at the text's begin, correctly rounded (infinite where it is too large), as fast as it goes:
- * [+-]digits[.digits][e[+-]digits]. Returns behind it, NULL where there is none. The text must go on behind
- * the number with anything that cannot belong to one. */
+/* Reads a number at the begin of a text, fast: [+-]digits[.digits][e[+-]digits], correctly rounded, infinite
+ * if it is too large. Returns its end, or NULL if there is none. A character that cannot belong to a number
+ * must follow it. */
 const char *vshi_decimal_float(const char *text, float *value);
 
-/* The shortest decimal that reads back as `value`, without exponent from 1e-6 to 1e9 (1e15); "nan", "inf" and
- * "-inf". Not ended by NUL. Returns behind it. */
+/* Writes the shortest decimal that reads back as `value`, without exponent from 1e-6 to 1e9 (1e15); "nan",
+ * "inf" or "-inf". Writes no NUL. Returns the text's end. */
 char *vshi_decimal_write_float(char *text, float value);
 char *vshi_decimal_write_double(char *text, double value);
 
@@ -32,8 +32,7 @@ char *vshi_decimal_write_double(char *text, double value);
 }
 #endif
 
-/* --- numbers by the C library: with a decimal point and rounded to nearest, whatever the host's locale and
- * rounding are */
+/* --- numbers by the C library, independent of the host's locale and rounding */
 
 typedef struct vshi_numbers {
     locale_t locale;
@@ -56,7 +55,7 @@ static inline void vshi_numbers_set_control(uint16_t word) {
 #endif
 }
 
-/* The C locale is a constant of the C library: nothing is taken, nothing to be given back. */
+/* The C locale is a constant of the C library, so it needs no freelocale(). */
 static inline vshi_numbers vshi_numbers_begin(void) {
     enum { ROUNDING = 0x0c00 }; /* 0: to nearest */
     const vshi_numbers host = {uselocale(newlocale(LC_ALL_MASK, "C", (locale_t)0)), vshi_numbers_control()};
@@ -69,7 +68,7 @@ static inline void vshi_numbers_end(const vshi_numbers *host) {
     vshi_numbers_set_control(host->control);
 }
 
-/* First in a scope that reads numbers, or writes them where they stay: of this thread only. */
+/* Put this first in a scope that reads numbers, or writes them to files. It affects this thread only. */
 #define VSHI_NUMBERS                                                                                         \
     const vshi_numbers host_numbers __attribute__((cleanup(vshi_numbers_end), unused)) = vshi_numbers_begin()
 

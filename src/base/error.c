@@ -1,11 +1,10 @@
 #include "base/error.h"
 
-#include "base/utf8.h"
+#include "base/text.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 const char *vsh_version(void) {
     return VSHI_VERSION;
@@ -29,55 +28,45 @@ const char *vsh_result_name(vsh_result result) {
     return result >= 0 && result < count ? result_names[result] : "VSH_ERROR_UNKNOWN";
 }
 
-enum {
-    LONGEST = 3 * 4096, /* two paths and what is said of them; more is allocated */
-    KEPT_BEFORE = 120   /* of what is too long: where the path begins; the rest is its end and the reason */
-};
-
-static const char left_out[] = "…";
-
-/* Cuts in the middle, where paths are long: what is wrong stands at the end. No character is cut. */
-static void shorten(char *message, size_t capacity, const char *full, size_t length) {
-    size_t before = KEPT_BEFORE, after = length - (capacity - 1 - before - (sizeof left_out - 1));
+/* Copies a message that is too long without its middle: the path's begin and the reason stay. Characters
+ * stay whole. */
+static void shorten(vsh_error *error, const char *full, size_t length) {
+    static const char ellipsis[] = "…";
+    size_t before = 120, after = length - (sizeof error->message - 1 - before - (sizeof ellipsis - 1));
     while (before > 0 && ((unsigned char)full[before] & 0xc0) == 0x80) {
         --before;
     }
     while (((unsigned char)full[after] & 0xc0) == 0x80) {
         ++after;
     }
-    snprintf(message, capacity, "%.*s%s%s", (int)before, full, left_out, full + after);
+    snprintf(error->message, sizeof error->message, "%.*s%s%s", (int)before, full, ellipsis, full + after);
 }
 
 vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...) {
     if (error == NULL) {
         return code;
     }
-    error->code = code;
-    char few[LONGEST], *more = NULL;
     va_list arguments, again;
     va_start(arguments, format);
     va_copy(again, arguments);
-    const int written = vsnprintf(few, sizeof few, format, arguments);
-    size_t length = written < 0 ? 0 : (size_t)written;
-    if (length >= sizeof few) {
-        more = malloc(length + 1);
-        length = more != NULL ? length : sizeof few - 1; /* the reason is lost then */
-    }
-    if (more != NULL) {
-        vsnprintf(more, length + 1, format, again);
+    const int length = vsnprintf(error->message, sizeof error->message, format, arguments);
+    if (length >= (int)sizeof error->message) {
+        char *full = malloc((size_t)length + 1);
+        if (full != NULL) { /* else the message stays without its end */
+            vsnprintf(full, (size_t)length + 1, format, again);
+            shorten(error, full, (size_t)length);
+        }
+        free(full);
     }
     va_end(again);
     va_end(arguments);
-    const char *full = more != NULL ? more : few;
-    if (length < sizeof error->message) {
-        memcpy(error->message, full, length);
-        error->message[length] = '\0';
-    } else {
-        shorten(error->message, sizeof error->message, full, length);
-    }
-    free(more);
+    error->code = code;
     vshi_one_line(error->message);
     return code;
+}
+
+vsh_result vshi_fail_memory(vsh_error *error, const char *what) {
+    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
 }
 
 void vshi_one_line(char *text) {

@@ -6,15 +6,15 @@
 
 #include <stddef.h>
 
-/* Marks what modules of this library call of it: exported under a version of its own (cmake/exports.map.in),
- * for nobody else. */
+/* Marks functions that modules of this library call. cmake/exports.map.in exports them under a private
+ * version. */
 #define VSHI_SHARED __attribute__((visibility("default")))
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
-/* The header's version, which is that of whatever is compiled with it: "0.2.0". */
+/* The version of the headers that this file is compiled with: "0.2.0". */
 #define VSHI_TEXT_OF(number) #number
 #define VSHI_TEXT(number) VSHI_TEXT_OF(number)
 #define VSHI_VERSION                                                                                         \
@@ -25,7 +25,10 @@ extern "C" {
 VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *format, ...)
     __attribute__((format(printf, 3, 4)));
 
-/* Ends a function of the API, whose `error` it fills, where a pointer that it needs is NULL. */
+/* Fails with VSH_ERROR_MEMORY: the system refused memory for `what`. */
+VSHI_SHARED vsh_result vshi_fail_memory(vsh_error *error, const char *what);
+
+/* Returns from a function of the API with VSH_ERROR_ARGUMENT in its `error`, if the pointer is NULL. */
 #define VSHI_NEEDS(pointer)                                                                                  \
     do {                                                                                                     \
         if ((pointer) == NULL) {                                                                             \
@@ -33,7 +36,7 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
         }                                                                                                    \
     } while (0)
 
-/* The same of an array of `count`, which may be NULL where that is 0. */
+/* Does the same for an array, which may be NULL if `count` is 0. */
 #define VSHI_NEEDS_OF(count, array)                                                                          \
     do {                                                                                                     \
         if ((count) > 0) {                                                                                   \
@@ -41,7 +44,7 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
         }                                                                                                    \
     } while (0)
 
-/* Returns what a call came to, unless that is VSH_OK. */
+/* Returns the result of a call, unless it is VSH_OK. */
 #define VSHI_TRY(call)                                                                                       \
     do {                                                                                                     \
         const vsh_result tried = (call);                                                                     \
@@ -50,8 +53,8 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
         }                                                                                                    \
     } while (0)
 
-/* Puts what a call came to into `result` and, unless that is VSH_OK, goes to the label `done`, where a
- * function that owns something gives it back. */
+/* Keeps the result of a call in `result` and, unless it is VSH_OK, goes to the label `done`, where the
+ * function frees its memory. */
 #define VSHI_TRY_DONE(call)                                                                                  \
     do {                                                                                                     \
         result = (call);                                                                                     \

@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <inttypes.h>
 #include <limits.h>
+#include <nettle/sha2.h>
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,57 +31,61 @@ const char *vshi_path_ending(const char *path) {
     return dot != NULL && dot != name ? dot + 1 : "";
 }
 
-/* --- temporary files beside their targets, and those that dead processes have left there */
+char *vshi_path_beside(const char *path, const char *name, size_t size) {
+    const size_t folder = (size_t)(last_part(path) - path);
+    char *text = malloc(folder + size + 1);
+    if (text != NULL) {
+        memcpy(text, path, folder);
+        memcpy(text + folder, name, size);
+        text[folder + size] = '\0';
+    }
+    return text;
+}
+
+/* --- temporary files beside their targets, and leftovers of dead processes */
 
 enum {
-    TEMPORARY_ROOM = 48,   /* bytes that the name adds to the target's: dots, process, number, "tmp" */
+    TEMPORARY_ROOM = 48,   /* bytes that a temporary's name adds to the target's */
     MAX_TEMPORARIES = 1000 /* of one target and process at a time */
 };
 
-/* The parts of a temporary's name around the process and the number. */
-typedef struct naming {
-    const char *name; /* the target's last part */
-    int folder_length, stem_length;
-    const char *dot, *ending;
-} naming;
-
-static naming naming_of(const char *target) {
-    naming n = {.name = last_part(target), .ending = vshi_path_ending(target)};
-    n.folder_length = (int)(n.name - target);
-    n.dot = n.ending[0] != '\0' ? "." : "";
-    const size_t ending = strlen(n.ending);
-    const size_t stem = ending > 0 ? (size_t)(n.ending - n.name) - 1 : strlen(n.name);
-    const size_t room = ending + TEMPORARY_ROOM < NAME_MAX ? NAME_MAX - ending - TEMPORARY_ROOM : 0;
-    n.stem_length = (int)(stem < room ? stem : room);
-    return n;
+/* Writes the name of a temporary of this target: ".NAME.PID.tmp.ENDING", or ".NAME.PID-NUMBER.tmp.ENDING".
+ * NAME is cut so that the system accepts the length. Returns the length of ".NAME.". */
+static size_t name_temporary(const char *target, long process, int number, char name[NAME_MAX + 1]) {
+    const char *stem = last_part(target), *ending = vshi_path_ending(target);
+    const size_t dot = ending[0] != '\0', ending_length = strlen(ending);
+    const size_t room =
+        ending_length + TEMPORARY_ROOM < NAME_MAX ? NAME_MAX - ending_length - TEMPORARY_ROOM : 0;
+    const size_t whole = strlen(stem) - ending_length - dot, length = whole < room ? whole : room;
+    char tag[16] = "";
+    if (number > 0) {
+        snprintf(tag, sizeof tag, "-%d", number);
+    }
+    snprintf(name, NAME_MAX + 1, ".%.*s.%ld%s.tmp%s%s", (int)length, stem, process, tag, dot > 0 ? "." : "",
+             ending);
+    return length + 2;
 }
 
-/* Whether the lock is ours now. Where the file system has none, nobody else has it either. */
+/* Returns whether this process has the lock now. Without locks of the file system, nobody else has it. */
 static bool lock(int file) {
     return flock(file, LOCK_EX | LOCK_NB) == 0 || (errno != EWOULDBLOCK && errno != EINTR);
 }
 
-/* Whether the path still leads to this file: one that was found without a lock may have been removed. */
+/* Returns whether the path still leads to this file. Another run may have removed it before it was locked. */
 static bool is_at(int file, const char *path) {
     struct stat held, there;
     return fstat(file, &held) == 0 && stat(path, &there) == 0 && held.st_dev == there.st_dev &&
            held.st_ino == there.st_ino;
 }
 
-/* Creates ".NAME.PID.tmp.ENDING" beside the target (with a number where that name is taken), empty, and
- * returns its descriptor, or -1 with errno. `path` has room for the target and TEMPORARY_ROOM more. As
- * long as the descriptor is open, it holds a lock on the file that says that its process lives. */
+/* Creates an empty temporary beside the target and returns its descriptor, or -1 with errno. `path` has room
+ * for the target and TEMPORARY_ROOM more. While the descriptor is open, its lock on the file tells other
+ * processes that this one lives. */
 static int create_temporary(const char *target, char *path, size_t capacity) {
-    const naming n = naming_of(target);
     for (int number = 0; number < MAX_TEMPORARIES; ++number) {
-        char tag[TEMPORARY_ROOM];
-        if (number == 0) {
-            snprintf(tag, sizeof tag, "%ld", (long)getpid());
-        } else {
-            snprintf(tag, sizeof tag, "%ld-%d", (long)getpid(), number);
-        }
-        snprintf(path, capacity, "%.*s.%.*s.%s.tmp%s%s", n.folder_length, target, n.stem_length, n.name, tag,
-                 n.dot, n.ending);
+        char name[NAME_MAX + 1];
+        name_temporary(target, (long)getpid(), number, name);
+        snprintf(path, capacity, "%.*s%s", (int)(last_part(target) - target), target, name);
         const int file = open(path, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
         if (file < 0 && errno != EEXIST) {
             return -1;
@@ -96,34 +101,21 @@ static int create_temporary(const char *target, char *path, size_t capacity) {
     return -1;
 }
 
-/* The process that a name tells of; 0: it is no temporary of this target. */
-static long process_of(const naming *n, const char *entry) {
-    if (entry[0] != '.' || strncmp(entry + 1, n->name, (size_t)n->stem_length) != 0 ||
-        entry[1 + n->stem_length] != '.') {
+/* Returns the process in the name of a temporary of this target; 0 for other names. */
+static long find_process(const char *target, const char *entry) {
+    char name[NAME_MAX + 1], *end;
+    const size_t before = name_temporary(target, 0, 0, name);
+    if (strncmp(entry, name, before) != 0) {
         return 0;
     }
-    const char *at = entry + 2 + n->stem_length;
-    const size_t digits = strspn(at, "0123456789");
-    if (digits == 0 || digits > 10) {
-        return 0;
-    }
-    const long process = strtol(at, NULL, 10);
-    at += digits;
-    if (*at == '-') {
-        const size_t number = strspn(at + 1, "0123456789");
-        at += number > 0 ? 1 + number : 0;
-    }
-    const size_t tag = strlen(".tmp");
-    if (strncmp(at, ".tmp", tag) != 0) {
-        return 0;
-    }
-    at += tag;
-    const size_t dot = strlen(n->dot);
-    return strncmp(at, n->dot, dot) == 0 && strcmp(at + dot, n->ending) == 0 ? process : 0;
+    const long process = strtol(entry + before, &end, 10);
+    const long number = *end == '-' ? strtol(end + 1, NULL, 10) : 0;
+    name_temporary(target, process, (int)number, name);
+    return process > 0 && strcmp(entry, name) == 0 ? process : 0;
 }
 
-/* Whether nobody holds the file. The lock is kept until `file` is closed. */
-static bool is_left(int file, long process) {
+/* Returns whether no process holds the file. Keeps the lock until `file` is closed. */
+static bool is_leftover(int file, long process) {
     if (flock(file, LOCK_EX | LOCK_NB) == 0) {
         return true;
     }
@@ -134,7 +126,6 @@ static bool is_left(int file, long process) {
  * other containers and most network file systems see the lock. Without locks, the process's number decides.
  * Files of other users, and those that cannot be opened, stay. */
 static void clean_temporaries(const char *target) {
-    const naming n = naming_of(target);
     char folder[PATH_MAX];
     find_folder(target, folder);
     DIR *listing = opendir(folder);
@@ -142,7 +133,7 @@ static void clean_temporaries(const char *target) {
         return;
     }
     for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing)) {
-        const long process = process_of(&n, entry->d_name);
+        const long process = find_process(target, entry->d_name);
         if (process == 0) {
             continue;
         }
@@ -151,7 +142,7 @@ static void clean_temporaries(const char *target) {
         struct stat status;
         if (file >= 0) {
             if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
-                is_left(file, process)) {
+                is_leftover(file, process)) {
                 unlinkat(dirfd(listing), entry->d_name, 0);
             }
             close(file);
@@ -191,24 +182,15 @@ void vshi_temporary_remove_own(void) {
 
 /* --- files that appear whole or not at all */
 
-static vsh_result check_target(const char *path, vsh_error *error) {
-    struct stat status;
-    if (stat(path, &status) != 0) {
-        return errno == ENOENT
-                   ? VSH_OK
-                   : vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
-    }
-    if (S_ISDIR(status.st_mode)) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is a folder", path);
-    }
-    if (!S_ISREG(status.st_mode)) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is no regular file", path);
-    }
-    /* rename() would pass over a read-only file, which its owner meant to keep */
-    if (access(path, W_OK) != 0) {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
-    }
-    return VSH_OK;
+static vsh_result fail_output(const char *path, const char *why, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, why);
+}
+
+/* Returns a reason not to read or write the file as a whole; NULL if it is a regular file. */
+static const char *find_obstacle(const struct stat *status) {
+    return S_ISDIR(status->st_mode)    ? "it is a folder"
+           : !S_ISREG(status->st_mode) ? "it is no regular file"
+                                       : NULL;
 }
 
 vsh_result vshi_output_check(const char *path, vsh_error *error) {
@@ -216,7 +198,7 @@ vsh_result vshi_output_check(const char *path, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output path: it is empty");
     }
     if (last_part(path)[0] == '\0') {
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: it is a folder", path);
+        return fail_output(path, "it is a folder", error);
     }
     char folder[PATH_MAX];
     find_folder(path, folder);
@@ -225,46 +207,47 @@ vsh_result vshi_output_check(const char *path, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: its folder: %s", path,
                          strerror(errno));
     }
-    return check_target(path, error);
+    if (stat(path, &status) != 0) {
+        return errno == ENOENT ? VSH_OK : fail_output(path, strerror(errno), error);
+    }
+    const char *obstacle = find_obstacle(&status);
+    /* rename() ignores that a file is read-only, but its owner meant to keep it */
+    return obstacle == NULL && access(path, W_OK) == 0
+               ? VSH_OK
+               : fail_output(path, obstacle != NULL ? obstacle : strerror(errno), error);
 }
 
 vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *error) {
     *output = (vshi_output){NULL, NULL, 0};
-    vsh_result result = vshi_output_check(path, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_output_check(path, error));
     struct stat old;
     const bool replaces = stat(path, &old) == 0;
     output->target = replaces ? realpath(path, NULL) : strdup(path);
     const size_t capacity = output->target != NULL ? strlen(output->target) + TEMPORARY_ROOM : 0;
     output->temporary = output->target != NULL ? malloc(capacity) : NULL;
     if (output->temporary == NULL) {
-        free(output->target);
-        output->target = NULL;
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+        vshi_output_abandon(output);
+        return vshi_fail_memory(error, path);
     }
     clean_temporaries(output->target);
     const int file = create_temporary(output->target, output->temporary, capacity);
     if (file < 0) {
-        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
+        const vsh_result result = fail_output(path, strerror(errno), error);
         free(output->temporary);
-        free(output->target);
-        *output = (vshi_output){NULL, NULL, 0};
+        output->temporary = NULL;
+        vshi_output_abandon(output);
         return result;
     }
     if (replaces && fchmod(file, old.st_mode & 0777) != 0) {
-        /* some file systems have no modes; the new file then has the usual ones */
-        errno = 0;
+        errno = 0; /* some file systems have no modes; the new file then has the usual ones */
     }
     output->held = file + 1;
     return VSH_OK;
 }
 
-/* Puts a file in its place, and syncs the folder, so that after a power cut the new name is there, and not
- * only the file's contents. What fails of the latter leaves the file in its place as it is: file systems
- * there are that cannot, and folders that may not be read. */
-static vsh_result put_in_place(const char *temporary, const char *target, vsh_error *error) {
+/* Moves a file to its place, and syncs the folder: otherwise a power cut may lose the new name. A failed sync
+ * is ignored, because some file systems cannot sync folders, and some folders cannot be read. */
+static vsh_result move_into_place(const char *temporary, const char *target, vsh_error *error) {
     char path[PATH_MAX];
     find_folder(target, path);
     const int folder = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
@@ -279,23 +262,21 @@ static vsh_result put_in_place(const char *temporary, const char *target, vsh_er
     return result;
 }
 
-static vsh_result sync_file(const char *temporary, const char *target, vsh_error *error) {
-    const int file = open(temporary, O_RDONLY | O_CLOEXEC);
-    const bool flushed = file >= 0 && (fsync(file) == 0 || errno == EINVAL); /* the file system cannot sync */
-    const int why = errno;
-    const bool closed = file < 0 || close(file) == 0;
-    return flushed && closed ? VSH_OK
-                             : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", target,
-                                         strerror(flushed ? errno : why));
+static vsh_result sync_file(const vshi_output *output, vsh_error *error) {
+    /* EINVAL: this file system syncs no files */
+    return fsync(output->held - 1) == 0 || errno == EINVAL
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", output->target,
+                           strerror(errno));
 }
 
-/* Another name for what stands at a target, "" where nothing does or the file system has no such names. It
- * looks like a temporary file that a killed process has left, which the next run takes away. */
+/* Makes a hard link to the old file at a target, *kept; "" if there is none, or the file system has no hard
+ * links. It is named like a leftover of a killed process, so the next run removes it. */
 static vsh_result keep_old(const char *target, char **kept, vsh_error *error) {
     const size_t capacity = strlen(target) + TEMPORARY_ROOM;
     *kept = malloc(capacity);
     if (*kept == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", target);
+        return vshi_fail_memory(error, target);
     }
     (*kept)[0] = '\0';
     if (access(target, F_OK) != 0) {
@@ -304,18 +285,18 @@ static vsh_result keep_old(const char *target, char **kept, vsh_error *error) {
     const int file = create_temporary(target, *kept, capacity);
     if (file < 0) {
         (*kept)[0] = '\0';
-        return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", target, strerror(errno));
+        return fail_output(target, strerror(errno), error);
     }
     close(file);
     unlink(*kept); /* the name was free; link() does not replace */
     if (link(target, *kept) != 0) {
-        (*kept)[0] = '\0'; /* no hard links here, or none of folders */
+        (*kept)[0] = '\0';
     }
     return VSH_OK;
 }
 
-/* What was put in place goes again, and what stood there before comes back. */
-static void take_back(const char *target, const char *kept) {
+/* Puts the old file back in place of the new one, or removes the new one if there was none. */
+static void restore_old(const char *target, const char *kept) {
     if (kept[0] != '\0') {
         (void)!rename(kept, target);
     } else {
@@ -325,21 +306,20 @@ static void take_back(const char *target, const char *kept) {
 
 vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_error *error) {
     char **kept = calloc(count + 1, sizeof *kept);
-    vsh_result result =
-        kept != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "outputs: the system refused memory");
+    vsh_result result = kept != NULL ? VSH_OK : vshi_fail_memory(error, "outputs");
     size_t placed = 0;
     for (size_t i = 0; i < count && result == VSH_OK; ++i) {
-        result = sync_file(outputs[i]->temporary, outputs[i]->target, error);
+        result = sync_file(outputs[i], error);
     }
     for (size_t i = 0; i < count && count > 1 && result == VSH_OK; ++i) {
         result = keep_old(outputs[i]->target, &kept[i], error);
     }
     for (; placed < count && result == VSH_OK; placed += result == VSH_OK) {
-        result = put_in_place(outputs[placed]->temporary, outputs[placed]->target, error);
+        result = move_into_place(outputs[placed]->temporary, outputs[placed]->target, error);
     }
     for (size_t i = 0; kept != NULL && i < count; ++i) {
         if (i < placed && result != VSH_OK) {
-            take_back(outputs[i]->target, kept[i]);
+            restore_old(outputs[i]->target, kept[i]);
         } else if (kept[i] != NULL && kept[i][0] != '\0') {
             unlink(kept[i]);
         }
@@ -401,7 +381,7 @@ int vshi_sink_close(vshi_sink *sink) {
     return sink->error;
 }
 
-/* --- opening a file that somebody else may have put there */
+/* --- files of strangers */
 
 static vsh_result fail_input(const char *name, const char *why, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", name, why);
@@ -412,8 +392,9 @@ static vsh_result check_input(int file, const char *name, uint64_t most, uint64_
     if (fstat(file, &status) != 0) {
         return fail_input(name, strerror(errno), error);
     }
-    if (!S_ISREG(status.st_mode)) {
-        return fail_input(name, S_ISDIR(status.st_mode) ? "it is a folder" : "it is no regular file", error);
+    const char *obstacle = find_obstacle(&status);
+    if (obstacle != NULL) {
+        return fail_input(name, obstacle, error);
     }
     *size = (uint64_t)status.st_size;
     if (*size > most) {
@@ -434,8 +415,7 @@ vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FI
     vsh_result result = check_input(opened, name, most, size, error);
     if (result == VSH_OK) {
         *file = fdopen(opened, "rb");
-        result = *file != NULL ? VSH_OK
-                               : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", name);
+        result = *file != NULL ? VSH_OK : vshi_fail_memory(error, name);
     }
     if (result != VSH_OK) {
         close(opened);
@@ -443,7 +423,7 @@ vsh_result vshi_input_open(const char *path, const char *name, uint64_t most, FI
     return result;
 }
 
-/* Cuts the last part off a whole path; "/" stays. */
+/* Removes the last part of an absolute path; "/" stays. */
 static void cut_last(char *path) {
     char *slash = strrchr(path, '/');
     slash[slash == path ? 1 : 0] = '\0';
@@ -468,4 +448,53 @@ bool vshi_input_is_beside(const char *model, const char *path) {
     char given[PATH_MAX];
     find_folder(model, given);
     return realpath(given, folder) != NULL && lies_in(folder, file);
+}
+
+/* --- SHA-256 of files, by Nettle */
+
+_Static_assert(VSH_DIGEST_TEXT == 2 * SHA256_DIGEST_SIZE + 1, "a digest's text");
+
+static vsh_result digest_stream(FILE *file, const char *path, char *digest, vshi_job *job, vsh_error *error) {
+    struct sha256_ctx context;
+    sha256_init(&context);
+    unsigned char bytes[1 << 14];
+    size_t count;
+    while ((count = fread(bytes, 1, sizeof bytes, file)) > 0) {
+        sha256_update(&context, count, bytes);
+        VSHI_TRY(vshi_job_step(job, 0, error));
+    }
+    if (ferror(file)) {
+        return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path);
+    }
+    uint8_t sum[SHA256_DIGEST_SIZE];
+    sha256_digest(&context, sizeof sum, sum);
+    for (size_t i = 0; i < sizeof sum; ++i) {
+        snprintf(digest + 2 * i, 3, "%02x", sum[i]);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vshi_job *job, vsh_error *error) {
+    FILE *file;
+    uint64_t size;
+    VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &file, &size, error));
+    const vsh_result result = digest_stream(file, path, digest, job, error);
+    fclose(file);
+    return result;
+}
+
+vsh_result vsh_file_digest(const char *path, const vsh_run *run, char digest[VSH_DIGEST_TEXT],
+                           vsh_error *error) {
+    VSHI_NEEDS(path);
+    VSHI_NEEDS(digest);
+    if (path[0] == '\0') {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "digest: no path");
+    }
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    vshi_job *job;
+    VSHI_TRY(vshi_job_open(&job, &full, "hash", 1, path, error));
+    const vsh_result result = vshi_file_digest(path, digest, job, error);
+    vshi_job_end(job);
+    return result;
 }

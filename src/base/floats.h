@@ -1,6 +1,5 @@
-/* The floating-point environment of a public call: the default one (round to nearest, denormals kept, nothing
- * traps), whatever the host has set, which it gets back. TBB's threads take it over from the thread that
- * makes an arena, so it must stand before one is made. */
+/* Public calls compute in the default floating-point environment (round to nearest, denormals kept, no traps)
+ * and restore the host's. TBB's threads copy it from the thread that makes an arena, so set it before. */
 #ifndef VSHI_FLOATS_H
 #define VSHI_FLOATS_H
 
@@ -18,7 +17,7 @@ typedef uint64_t vshi_floats;
 
 #if defined(__x86_64__)
 
-/* MXCSR: all exceptions masked, everything else 0; its low six bits only tell what has happened. */
+/* MXCSR: all exceptions masked, everything else 0. Its low six bits are flags of past exceptions. */
 #define VSHI_FLOATS_DEFAULT 0x1f80u
 #define VSHI_FLOATS_FLAGS 0x3fu
 
@@ -86,7 +85,7 @@ static inline void vshi_floats_end(const vshi_floats *host) {
 }
 #endif
 
-/* First in a public function: the default environment until it returns. */
+/* Put this first in a public function: it sets the default environment until the function returns. */
 #define VSHI_FLOATS                                                                                          \
     const vshi_floats host_floats __attribute__((cleanup(vshi_floats_end), unused)) = vshi_floats_begin()
 

@@ -1,7 +1,6 @@
-/* malloc() and the like for the two programs, not for the library. Foreign libraries do not survive refused
+/* malloc() and the like for the two programs, not for the library. Other libraries do not survive refused
  * memory: OpenVDB, GLib and log4cplus end the process, Blosc writes through NULL, C++ streams drop text. So
- * the program ends when a block is refused to anybody but this library, whose code returns VSH_ERROR_MEMORY.
- */
+ * the program ends if another library is refused a block. Our library returns VSH_ERROR_MEMORY itself. */
 #define _GNU_SOURCE /* RTLD_NEXT, dladdr */
 #include "base/memory.h"
 
@@ -10,21 +9,6 @@
 #include <stdatomic.h>
 #include <stdlib.h>
 #include <string.h>
-
-/* The next definition: that of libc, a sanitizer, or an allocator that was preloaded. */
-static void *find_next(_Atomic(void *) *found, const char *name) {
-    void *next = atomic_load(found);
-    if (next == NULL) {
-        next = dlsym(RTLD_NEXT, name);
-        atomic_store(found, next);
-    }
-    return next;
-}
-
-#define NEXT(name, to)                                                                                       \
-    static _Atomic(void *) found;                                                                            \
-    void *symbol = find_next(&found, #name);                                                                 \
-    memcpy(&(to), &symbol, sizeof(to))
 
 static bool is_library(const void *caller) {
     Dl_info info;
@@ -39,39 +23,36 @@ static void *check(void *block, size_t size, const void *caller) {
     return block;
 }
 
-VSHI_SHARED void *malloc(size_t size) {
-    void *(*next)(size_t);
-    NEXT(malloc, next);
-    return check(next(size), size, __builtin_return_address(0));
+/* Finds the next definition, of libc, a sanitizer or a preloaded allocator, and stores it in the function
+ * pointer. */
+static void find_next(_Atomic(void *) *found, const char *name, void *function) {
+    void *next = atomic_load(found);
+    if (next == NULL) {
+        next = dlsym(RTLD_NEXT, name);
+        atomic_store(found, next);
+    }
+    memcpy(function, &next, sizeof next);
 }
 
-VSHI_SHARED void *calloc(size_t count, size_t size) {
-    void *(*next)(size_t, size_t);
-    NEXT(calloc, next);
-    return check(next(count, size), count * size, __builtin_return_address(0));
-}
+/* Defines a function that calls the next definition and checks the block. */
+#define GUARD(name, parameters, arguments, size)                                                             \
+    VSHI_SHARED void *name parameters {                                                                      \
+        static _Atomic(void *) found;                                                                        \
+        void *(*next)parameters;                                                                             \
+        find_next(&found, #name, &next);                                                                     \
+        return check(next arguments, size, __builtin_return_address(0));                                     \
+    }
 
-VSHI_SHARED void *realloc(void *block, size_t size) {
-    void *(*next)(void *, size_t);
-    NEXT(realloc, next);
-    return check(next(block, size), size, __builtin_return_address(0));
-}
-
-VSHI_SHARED void *memalign(size_t alignment, size_t size) {
-    void *(*next)(size_t, size_t);
-    NEXT(memalign, next);
-    return check(next(alignment, size), size, __builtin_return_address(0));
-}
-
-VSHI_SHARED void *aligned_alloc(size_t alignment, size_t size) {
-    void *(*next)(size_t, size_t);
-    NEXT(aligned_alloc, next);
-    return check(next(alignment, size), size, __builtin_return_address(0));
-}
+GUARD(malloc, (size_t size), (size), size)
+GUARD(calloc, (size_t count, size_t size), (count, size), count *size)
+GUARD(realloc, (void *block, size_t size), (block, size), size)
+GUARD(memalign, (size_t alignment, size_t size), (alignment, size), size)
+GUARD(aligned_alloc, (size_t alignment, size_t size), (alignment, size), size)
 
 VSHI_SHARED int posix_memalign(void **block, size_t alignment, size_t size) {
+    static _Atomic(void *) found;
     int (*next)(void **, size_t, size_t);
-    NEXT(posix_memalign, next);
+    find_next(&found, "posix_memalign", &next);
     const int code = next(block, alignment, size);
     check(code == 0 ? *block : NULL, size, __builtin_return_address(0));
     return code;

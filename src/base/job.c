@@ -1,8 +1,8 @@
 #include "base/job.h"
 
-#include "base/isa.h"
 #include "base/parallel.h"
 
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -33,6 +33,12 @@ vshi_job *vshi_job_begin(const vsh_run *run, const char *stage, size_t total) {
     atomic_flag_clear(&job->reporting);
     vshi_job_advance(job, 0);
     return job;
+}
+
+vsh_result vshi_job_open(vshi_job **job, const vsh_run *run, const char *stage, size_t total,
+                         const char *what, vsh_error *error) {
+    *job = vshi_job_begin(run, stage, total);
+    return *job != NULL ? VSH_OK : vshi_fail_memory(error, what);
 }
 
 void vshi_job_end(vshi_job *job) {
@@ -69,8 +75,8 @@ bool vshi_job_cancelled(const vshi_job *job) {
 int32_t vshi_job_threads(const vshi_job *job) {
     const int32_t wanted = job->run.threads;
     const int32_t given = vshi_parallel_threads(wanted);
-    static atomic_flag told = ATOMIC_FLAG_INIT; /* once a process, whose threads they are */
-    if (given != wanted && vshi_wants_notes(&job->run) && !atomic_flag_test_and_set(&told)) {
+    static atomic_flag noted = ATOMIC_FLAG_INIT; /* once a process */
+    if (given != wanted && vshi_wants_notes(&job->run) && !atomic_flag_test_and_set(&noted)) {
         const char *than = wanted > 0 ? "asked for" : "there are cores";
         vshi_note(&job->run,
                   "the system gives this process fewer threads than %s (%d at a time): slower, with the same "
@@ -84,6 +90,101 @@ vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", job->stage);
 }
 
+vsh_result vshi_job_check(const vshi_job *job, vsh_error *error) {
+    return vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+}
+
+vsh_result vshi_job_step(vshi_job *job, size_t units, vsh_error *error) {
+    return vshi_job_advance(job, units) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+}
+
+/* --- loops over elements that may fail */
+
+typedef struct elements {
+    vshi_element_fn *fn;
+    void *user;
+    pthread_mutex_t lock; /* of the members below */
+    size_t failed;        /* the lowest element that failed */
+    vsh_result result;
+    vsh_error error;
+} elements;
+
+static void handle_elements(void *user, size_t begin, size_t end) {
+    elements *all = user;
+    for (size_t i = begin; i < end; ++i) {
+        vsh_error error;
+        const vsh_result result = all->fn(all->user, i, &error);
+        if (result == VSH_OK) {
+            continue;
+        }
+        pthread_mutex_lock(&all->lock);
+        if (all->result == VSH_OK || i < all->failed) {
+            all->failed = i;
+            all->result = result;
+            all->error = error;
+        }
+        pthread_mutex_unlock(&all->lock);
+    }
+}
+
+vsh_result vshi_parallel_each(vshi_job *job, size_t count, size_t grain, size_t units, vshi_element_fn *fn,
+                              void *user, vsh_error *error) {
+    elements all = {.fn = fn, .user = user, .lock = PTHREAD_MUTEX_INITIALIZER, .result = VSH_OK};
+    VSHI_TRY(vshi_parallel_for(job, count, grain, units, handle_elements, &all, error));
+    if (all.result != VSH_OK && error != NULL) {
+        *error = all.error;
+    }
+    return all.result;
+}
+
+/* --- instruction sets */
+
+/* Returns a part of an instruction set that this machine lacks; NULL if it has all. */
+static const char *find_lacking(int32_t isa) {
+#if defined(__x86_64__)
+    if (isa == VSH_ISA_AVX2) {
+        return __builtin_cpu_supports("avx2") ? NULL : "AVX2";
+    }
+    if (isa == VSH_ISA_AVX512) {
+        return !__builtin_cpu_supports("avx512f")    ? "AVX-512F"
+               : !__builtin_cpu_supports("avx512dq") ? "AVX-512DQ"
+               : !__builtin_cpu_supports("avx512vl") ? "AVX-512VL"
+                                                     : NULL;
+    }
+    return NULL;
+#else
+    return isa > VSH_ISA_BASE ? "x86-64" : NULL;
+#endif
+}
+
+int32_t vshi_isa_available(int32_t isa) {
+    return vsh_get_name(VSH_NAMES_ISA, isa) != NULL && find_lacking(isa) == NULL;
+}
+
+static vsh_result check_isa(int32_t isa, vsh_error *error) {
+    if (vsh_get_name(VSH_NAMES_ISA, isa) == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %d is out of range 0 … %d", isa, VSHI_ISA_COUNT - 1);
+    }
+    if (find_lacking(isa) != NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %s: this machine has no %s",
+                         vsh_get_name(VSH_NAMES_ISA, isa), find_lacking(isa));
+    }
+    return VSH_OK;
+}
+
+int32_t vshi_isa_resolve(int32_t isa) {
+    if (isa != VSH_ISA_BEST) {
+        return isa;
+    }
+    int32_t best = VSHI_ISA_COUNT - 1;
+    while (find_lacking(best) != NULL) {
+        --best;
+    }
+    return best;
+}
+
+/* --- options */
+
 vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, const char *what,
                                 vsh_error *error) {
     if (given == NULL) {
@@ -91,9 +192,8 @@ vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, 
     }
     size_t given_size;
     memcpy(&given_size, given, sizeof given_size);
-    /* every version's size is a multiple of its first member's: another would cut a pointer in two */
-    const bool whole = given_size % sizeof given_size == 0;
-    if (given_size <= sizeof given_size || given_size > size || !whole) {
+    /* other sizes than multiples of the first member's would cut a pointer in two */
+    if (given_size <= sizeof given_size || given_size > size || given_size % sizeof given_size != 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: struct_size %zu, expected %zu; fill it with its default function", what,
                          given_size, size);
@@ -104,10 +204,7 @@ vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, 
 
 vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error) {
     *full = vsh_run_default();
-    const vsh_result result = vshi_options_resolve(run, full, sizeof *full, "vsh_run", error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_options_resolve(run, full, sizeof *full, "vsh_run", error));
     if (full->threads < 0 || full->threads > 1024) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "threads %d: expected 0 … 1024", full->threads);
     }
@@ -118,7 +215,7 @@ vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error)
     if (full->confined != 0 && full->reader == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "confined: needs a reader; vsh_run.reader is NULL");
     }
-    return vshi_isa_check(full->isa, error);
+    return check_isa(full->isa, error);
 }
 
 __attribute__((format(printf, 3, 0))) static void send_line(const vsh_run *run, const char *prefix,

@@ -1,6 +1,6 @@
-/* TBB's threads begin each other, and where the system refuses one of them that, nobody is there to catch
- * what is thrown: std::terminate() ends the host. So as many are begun here first, and no more asked of TBB
- * than there were. What is known of it belongs to the process, as its threads do. */
+/* TBB's threads begin each other. If the system refuses one, the exception is caught nowhere, and
+ * std::terminate() ends the host. So this file begins as many threads first, and TBB gets no more than the
+ * system allowed. The limit is kept for the whole process. */
 #define _GNU_SOURCE /* gettid */
 #include "base/threads.h"
 
@@ -19,55 +19,39 @@
 #include <unistd.h>
 
 enum {
-    SPARE = VSHI_OPENVDB_THREADS + 2, /* left to others: the host's, another process of the user */
-    YIELDS = 100,                     /* for the end of a thread; then */
-    NAPS = 10000                      /* of a tenth of a millisecond */
+    SPARE = VSHI_OPENVDB_THREADS + 2, /* for the host and other processes of the user */
+    YIELDS = 100,                     /* before the first nap, while a thread ends */
+    NAPS = 10000                      /* each takes a tenth of a millisecond */
 };
 
-static pthread_mutex_t looking = PTHREAD_MUTEX_INITIALIZER;
-static _Atomic int32_t known; /* that were given */
-static bool refused;          /* one was; guarded by `looking` */
+static pthread_mutex_t trying = PTHREAD_MUTEX_INITIALIZER;
+static _Atomic int32_t known; /* threads that the system gave */
+static bool refused;          /* the system refused one; guarded by `trying` */
 
-typedef struct gate {
-    pthread_mutex_t lock;
-    pthread_cond_t opens;
-    bool open;
-    pid_t *tasks; /* [count]: those that came */
-    int32_t count;
-} gate;
+/* Threads that are tried wait for this, so that all of them live at once. */
+static pthread_mutex_t gate = PTHREAD_MUTEX_INITIALIZER;
 
-static void *wait_at(void *user) {
-    gate *at = user;
-    pthread_mutex_lock(&at->lock);
-    at->tasks[at->count++] = gettid();
-    while (!at->open) {
-        pthread_cond_wait(&at->opens, &at->lock);
-    }
-    pthread_mutex_unlock(&at->lock);
+static void *wait_at_gate(void *task) {
+    *(pid_t *)task = gettid();
+    pthread_mutex_lock(&gate);
+    pthread_mutex_unlock(&gate);
     return NULL;
 }
 
-static void open_gate(gate *at) {
-    pthread_mutex_lock(&at->lock);
-    at->open = true;
-    pthread_cond_broadcast(&at->opens);
-    pthread_mutex_unlock(&at->lock);
-}
-
-/* Not where there is no /proc. */
-static bool is_there(pid_t task) {
+/* Returns whether a task of this process lives; false without /proc. */
+static bool is_alive(pid_t task) {
     char path[48];
     struct stat status;
     snprintf(path, sizeof path, "/proc/self/task/%d", (int)task);
     return stat(path, &status) == 0;
 }
 
-/* A thread that was joined counts against limits until the system has ended its task: on a busy machine, for
+/* Joined threads count against limits until the system has ended their tasks. On a busy machine that takes
  * milliseconds. */
-static void await_ends(const gate *at) {
+static void await_ends(const pid_t *tasks, int32_t count) {
     int looks = 0;
-    for (int32_t i = 0; i < at->count; ++i) {
-        for (; looks < YIELDS + NAPS && is_there(at->tasks[i]); ++looks) {
+    for (int32_t i = 0; i < count; ++i) {
+        for (; looks < YIELDS + NAPS && is_alive(tasks[i]); ++looks) {
             if (looks < YIELDS) {
                 sched_yield();
             } else {
@@ -77,21 +61,22 @@ static void await_ends(const gate *at) {
     }
 }
 
-static int32_t begin(int32_t wanted, const pthread_attr_t *attributes, pthread_t *threads, pid_t *tasks) {
-    gate at = {PTHREAD_MUTEX_INITIALIZER, PTHREAD_COND_INITIALIZER, false, tasks, 0};
+static int32_t begin_all(int32_t wanted, const pthread_attr_t *attributes, pthread_t *threads, pid_t *tasks) {
     int32_t begun = 0;
-    while (begun < wanted && pthread_create(&threads[begun], attributes, wait_at, &at) == 0) {
+    pthread_mutex_lock(&gate);
+    while (begun < wanted && pthread_create(&threads[begun], attributes, wait_at_gate, &tasks[begun]) == 0) {
         ++begun;
     }
-    open_gate(&at);
+    pthread_mutex_unlock(&gate);
     for (int32_t i = 0; i < begun; ++i) {
         pthread_join(threads[i], NULL);
     }
-    await_ends(&at);
+    await_ends(tasks, begun);
     return begun;
 }
 
-/* The threads take no signals: a host's handlers may rely on who runs them. */
+/* Returns how many of `wanted` threads the system begins. They block all signals, because a host's handlers
+ * may rely on the thread. */
 static int32_t try(int32_t wanted, size_t stack) {
     sigset_t all, before;
     pthread_attr_t attributes;
@@ -105,7 +90,7 @@ static int32_t try(int32_t wanted, size_t stack) {
     }
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    const int32_t begun = begin(wanted, &attributes, threads, (pid_t *)(threads + wanted));
+    const int32_t begun = begin_all(wanted, &attributes, threads, (pid_t *)(threads + wanted));
     pthread_sigmask(SIG_SETMASK, &before, NULL);
     pthread_attr_destroy(&attributes);
     free(threads);
@@ -116,22 +101,22 @@ int32_t vshi_threads_given(int32_t wanted, size_t stack) {
     if (wanted <= atomic_load(&known)) {
         return wanted;
     }
-    pthread_mutex_lock(&looking);
+    pthread_mutex_lock(&trying);
     const int32_t before = atomic_load(&known);
     if (wanted > before && !refused) {
         const int32_t free = try(wanted + SPARE, stack) - SPARE;
         refused = free < wanted;
         atomic_store(&known, free > before ? free : before);
     }
-    pthread_mutex_unlock(&looking);
+    pthread_mutex_unlock(&trying);
     const int32_t now = atomic_load(&known);
     return wanted < now ? wanted : now;
 }
 
 bool vshi_threads_left(int32_t wanted) {
-    pthread_mutex_lock(&looking);
+    pthread_mutex_lock(&trying);
     const bool left = try(wanted, 0) == wanted;
-    pthread_mutex_unlock(&looking);
+    pthread_mutex_unlock(&trying);
     return left;
 }
 

@@ -1,10 +1,15 @@
-/* Vectors of three doubles, and transforms of three rows of four. */
+/* Vectors of three doubles, and transforms of three rows of four. A similarity rotates, moves, mirrors and
+ * scales evenly. */
 #ifndef VSHI_VEC_H
 #define VSHI_VEC_H
 
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
 
 typedef struct vshi_vec {
     double x, y, z;
@@ -38,8 +43,8 @@ static inline bool vshi_finite(vshi_vec a) {
     return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
 }
 
-/* Unit vector along a, or zero where a has no direction. What would leave the range of doubles when squared
- * is scaled first, so that neither 1e-200 nor 1e200 is lost. */
+/* Unit vector along a, or zero if a has no direction. Squares of very small and large vectors leave the range
+ * of doubles, so these are scaled first. */
 static inline vshi_vec vshi_unit(vshi_vec a) {
     const double square = vshi_dot(a, a);
     if (square > 1e-200 && square < 1e200) {
@@ -82,7 +87,7 @@ static inline vshi_vec vshi_transform_vector(const double *m, vshi_vec v) {
                       m[8] * v.x + m[9] * v.y + m[10] * v.z};
 }
 
-/* Determinant of the linear part: negative where the transform mirrors. */
+/* Determinant of the linear part: negative if the transform mirrors. */
 static inline double vshi_transform_determinant(const double *m) {
     if (m == NULL) {
         return 1.0;
@@ -91,7 +96,7 @@ static inline double vshi_transform_determinant(const double *m) {
            m[2] * (m[4] * m[9] - m[5] * m[8]);
 }
 
-/* Normal through the cofactors of the linear part, which serve mirrored and uneven scales alike; not
+/* Normal through the cofactors of the linear part, which handle mirroring and uneven scales; not
  * normalised. */
 static inline vshi_vec vshi_transform_normal(const double *m, vshi_vec n) {
     if (m == NULL) {
@@ -108,6 +113,69 @@ static inline vshi_vec vshi_transform_normal(const double *m, vshi_vec n) {
     };
 }
 
+/* Uniform scale of a transform [12]; 0 for one that shears, scales unevenly or flattens. */
+double vshi_similarity_scale(const double m[12]);
+
+/* Whether a finite transform flattens all shapes. */
+bool vshi_transform_flattens(const double m[12]);
+
+/* Quaternion x, y, z, w of the rotation in a similarity of that scale, which must not mirror. */
+void vshi_similarity_rotation(const double m[12], double scale, double q[4]);
+
+/* a × b: rotates by b, then by a. `result` may be a or b. */
+void vshi_quaternion_multiply(const double a[4], const double b[4], double result[4]);
+
+/* Grows the box low … high by a point. An empty box has low > high. */
+static inline void vshi_grow_box(double low[3], double high[3], vshi_vec p) {
+    const double at[3] = {p.x, p.y, p.z};
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = at[axis] < low[axis] ? at[axis] : low[axis];
+        high[axis] = at[axis] > high[axis] ? at[axis] : high[axis];
+    }
+}
+
+/* Grows a box by another box, transformed. */
+static inline void vshi_grow_box_by(double low[3], double high[3], const double *m, const double from[3],
+                                    const double to[3]) {
+    for (int i = 0; i < 8; ++i) {
+        const vshi_vec corner = {i & 1 ? to[0] : from[0], i & 2 ? to[1] : from[1], i & 4 ? to[2] : from[2]};
+        vshi_grow_box(low, high, vshi_transform_point(m, corner));
+    }
+}
+
+/* The normal of a triangle, twice its area long. */
+static inline vshi_vec vshi_triangle_normal(const vshi_vec corner[3]) {
+    return vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0]));
+}
+
+static inline double vshi_triangle_area(const vshi_vec corner[3]) {
+    return 0.5 * vshi_length(vshi_triangle_normal(corner));
+}
+
+/* A point of a triangle; u and v of 0 … 1 spread evenly give points spread evenly over its area. */
+static inline vshi_vec vshi_triangle_point(const vshi_vec corner[3], double u, double v) {
+    if (u + v > 1.0) {
+        u = 1.0 - u;
+        v = 1.0 - v;
+    }
+    return vshi_add(corner[0], vshi_add(vshi_scale(vshi_sub(corner[1], corner[0]), u),
+                                        vshi_scale(vshi_sub(corner[2], corner[0]), v)));
+}
+
+/* Limits the part from … to of a ray to low … high along one axis; a part without a point has to < from.
+ * Comparisons, as fmin() and fmax() are calls for the sake of NaN. */
+static inline void vshi_clip_axis(double origin, double along, double low, double high, double *from,
+                                  double *to) {
+    if (along == 0.0) {
+        *to = origin >= low && origin <= high ? *to : -1.0;
+        return;
+    }
+    const double a = (low - origin) / along, b = (high - origin) / along;
+    const double first = a < b ? a : b, last = a < b ? b : a;
+    *from = first > *from ? first : *from;
+    *to = last < *to ? last : *to;
+}
+
 /* A piece of a ray in world space, from `origin` up to `far` along the unit `direction`. */
 typedef struct vshi_segment_ray {
     double origin[3];
@@ -115,4 +183,7 @@ typedef struct vshi_segment_ray {
     double far; /* may be infinite */
 } vshi_segment_ray;
 
+#ifdef __cplusplus
+}
+#endif
 #endif

@@ -1,6 +1,12 @@
 /* Functions for bindings: defaults of structs by their names, as the headers' functions are inline, and
- * progress for languages whose callbacks take long. */
+ * progress for languages with slow callbacks. And the reader's parsers for each kind of file. */
+#include "bindings/bindings.h"
 #include "base/clock.h"
+#include "image/image.h"
+#include "levelset/access.h"
+#include "lit/work.h"
+#include "model/model.h"
+#include "outline/outline.h"
 
 #include <vdbshade/vdbshade.h>
 
@@ -8,25 +14,21 @@
 #include <stdbool.h>
 #include <string.h>
 
-/* Structs that a caller fills, with what fills them. SIZED ones begin with their size. */
+/* Structs and their defaults. SIZED ones begin with their size. */
 #define STRUCTS(SIZED, UNSIZED)                                                                              \
     SIZED(vsh_bake_options, vsh_bake_options_default)                                                        \
     SIZED(vsh_bake_stats, vsh_bake_stats_zero)                                                               \
     SIZED(vsh_camera, vsh_camera_default)                                                                    \
     SIZED(vsh_compare_files_options, vsh_compare_files_options_default)                                      \
     SIZED(vsh_compare_options, vsh_compare_options_default)                                                  \
-    SIZED(vsh_field_options, vsh_field_options_default)                                                      \
     SIZED(vsh_flat_options, vsh_flat_options_default)                                                        \
     SIZED(vsh_grid_options, vsh_grid_options_default)                                                        \
     SIZED(vsh_image_options, vsh_image_options_default)                                                      \
-    SIZED(vsh_layer, vsh_layer_default)                                                                      \
     SIZED(vsh_lightmap_options, vsh_lightmap_options_default)                                                \
     SIZED(vsh_lit_options, vsh_lit_options_default)                                                          \
     SIZED(vsh_mask_options, vsh_mask_options_default)                                                        \
-    SIZED(vsh_occluder_parts, vsh_occluder_parts_default)                                                    \
     SIZED(vsh_occluders_options, vsh_occluders_options_default)                                              \
     SIZED(vsh_point_layout, vsh_point_layout_default)                                                        \
-    SIZED(vsh_progress_filter, vsh_progress_filter_default)                                                  \
     SIZED(vsh_provenance_source, vsh_provenance_source_default)                                              \
     SIZED(vsh_query_output, vsh_query_output_default)                                                        \
     SIZED(vsh_render_options, vsh_render_options_default)                                                    \
@@ -44,6 +46,7 @@
     UNSIZED(vsh_light, vsh_light_default)                                                                    \
     UNSIZED(vsh_receiver, vsh_receiver_default)                                                              \
     UNSIZED(vsh_scene, vsh_scene_default)                                                                    \
+    UNSIZED(vsh_scene_layer, vsh_scene_layer_default)                                                        \
     UNSIZED(vsh_sdf_node, vsh_sdf_node_default)
 
 #define MAKE(type, defaults)                                                                                 \
@@ -61,7 +64,7 @@ static const struct {
     bool sized;
 } structs[] = {STRUCTS(SIZED, UNSIZED)};
 
-int32_t vsh_struct_init(const char *name, void *made, size_t size) {
+int32_t vshi_struct_init(const char *name, void *made, size_t size) {
     if (name == NULL || made == NULL) {
         return 0;
     }
@@ -69,7 +72,7 @@ int32_t vsh_struct_init(const char *name, void *made, size_t size) {
         if (strcmp(structs[i].name, name) == 0) {
             structs[i].make(made, size);
             if (structs[i].sized && size >= sizeof size) {
-                memcpy(made, &size, sizeof size); /* the caller's, whatever this library knows */
+                memcpy(made, &size, sizeof size); /* the caller's */
             }
             return 1;
         }
@@ -77,9 +80,9 @@ int32_t vsh_struct_init(const char *name, void *made, size_t size) {
     return 0;
 }
 
-/* Called by one thread at a time (vsh_progress_fn), so that nothing here is locked. */
-int32_t vsh_progress_seldom(void *given, const char *stage, double fraction) {
-    vsh_progress_filter *filter = given;
+/* Needs no lock: one thread at a time calls a vsh_progress_fn. */
+int32_t vshi_progress_seldom(void *given, const char *stage, double fraction) {
+    vshi_progress_filter *filter = given;
     if (filter == NULL || filter->progress == NULL || filter->answered != 0) {
         return filter != NULL ? filter->answered : 0;
     }
@@ -89,7 +92,17 @@ int32_t vsh_progress_seldom(void *given, const char *stage, double fraction) {
     const double now = vshi_seconds();
     if (fraction <= 0.0 || fraction >= 1.0 || now - filter->last >= filter->seconds) {
         filter->answered = filter->progress(filter->user, stage, fraction);
-        filter->last = vshi_seconds(); /* the callback's own time counts as nobody's */
+        filter->last = vshi_seconds(); /* without the callback's own time */
     }
     return filter->answered;
+}
+
+int32_t vsh_reader_serve(int argc, char **argv) {
+    static vshi_serve_fn *const servers[VSHI_READ_KINDS] = {
+        [VSHI_READ_GRID] = vshi_serve_grid,     [VSHI_READ_LIST] = vshi_serve_list,
+        [VSHI_READ_VOXELS] = vshi_serve_voxels, [VSHI_READ_MODEL] = vshi_serve_model,
+        [VSHI_READ_IMAGE] = vshi_serve_image,   [VSHI_READ_TEXT] = vshi_serve_text,
+        [VSHI_READ_COPY] = vshi_serve_copy,     [VSHI_READ_DRACO] = vshi_serve_draco,
+    };
+    return vshi_serve(servers, argc, argv);
 }

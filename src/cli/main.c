@@ -1,56 +1,424 @@
-/* vdbshade: the command line. Which subcommand, and the exit code. */
-#include "commands.h"
-#include "message.h"
-#include "progress.h"
-#include "signals.h"
-#include "warnings.h"
+/* vdbshade: the table of commands, their help and man pages, the command `help`, and main(). */
+#include "cli.h"
 
+#include <ctype.h>
 #include <errno.h>
-#include <stdio.h>
-#include <string.h>
+#include <limits.h>
+#include <strings.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
 #include <unistd.h>
-#include <vdbshade/reader.h>
 
-static int unknown_command(const char *text) {
-    if (text[0] == '-') {
-        return cli_usage("%s: no such option; see 'vdbshade --help'", text);
+static const cli_command *const commands[] = {
+    &cli_bake, &cli_merge, &cli_unwrap,  &cli_voxelize, &cli_info,  &cli_volume, &cli_query, &cli_render,
+    &cli_view, &cli_flat,  &cli_compare, &cli_regress,  &cli_trade, &cli_help,   NULL};
+
+static const struct {
+    int code;
+    const char *meaning;
+} exits[] = {
+    {CLI_OK, "success"},
+    {CLI_UNLIKE, "a comparison failed"},
+    {CLI_USAGE, "wrong usage or input"},
+    {CLI_FILE, "a file could not be read or written"},
+    {CLI_LIMIT, "a limit (memory, size) would be exceeded"},
+    {CLI_DEFECT, "a defect of vdbshade"},
+    {CLI_INTERRUPTED, "interrupted"},
+};
+
+static const char summary[] = "Bakes soft shadows and ambient occlusion from signed distance fields.";
+
+static const char errors[] =
+    "Errors are one line on standard error; a failed or interrupted run leaves the old output as it was.";
+
+static const cli_command *find_command(const char *name) {
+    size_t i = 0;
+    while (commands[i] != NULL && strcmp(name, commands[i]->name) != 0) {
+        ++i;
     }
-    const char *near = cli_nearest_topic(text, false);
-    if (near != NULL) {
-        return cli_usage("%s: no such command; did you mean %s?", text, near);
-    }
-    return cli_usage("%s: no such command; see 'vdbshade --help'", text);
+    return commands[i];
 }
 
-static int dispatch(int argc, char **argv) {
-    if (argc < 2) {
-        return cli_usage("no command; see 'vdbshade --help'");
+/* --- running text, broken into lines at blanks */
+
+typedef void put_word_fn(FILE *out, const char *word, int length, bool first);
+
+typedef struct text {
+    FILE *out;
+    int width;        /* characters of a line, if words are not longer */
+    int lead;         /* blanks before the first line */
+    int indent;       /* blanks before each later line */
+    put_word_fn *put; /* NULL: words stay as they are; `first` begins a line */
+    int column;       /* 0 to begin with */
+} text;
+
+/* Counts the characters of UTF-8 text. */
+static int count_characters(const char *word, size_t length) {
+    int count = 0;
+    for (size_t i = 0; i < length; ++i) {
+        count += ((unsigned char)word[i] & 0xc0) != 0x80;
     }
+    return count;
+}
+
+static void add_words(text *t, const char *words) {
+    static const char blanks[] = " \n";
+    for (words += strspn(words, blanks); *words != '\0'; words += strspn(words, blanks)) {
+        const size_t length = strcspn(words, blanks);
+        const int wide = count_characters(words, length);
+        if (t->column > 0 && t->column + 1 + wide > t->width) {
+            fputc('\n', t->out);
+            t->column = 0;
+        }
+        const bool first = t->column == 0;
+        if (first) {
+            fprintf(t->out, "%*s", t->lead, "");
+            t->lead = t->indent;
+        } else {
+            fputc(' ', t->out);
+        }
+        if (t->put != NULL) {
+            t->put(t->out, words, (int)length, first);
+        } else {
+            fwrite(words, 1, length, t->out);
+        }
+        t->column += wide + !first;
+        words += length;
+    }
+}
+
+/* Writes words as lines. */
+static void write_text(text t, const char *words) {
+    add_words(&t, words);
+    fputc('\n', t.out);
+}
+
+/* --- help on standard output */
+
+enum { HELP_COLUMN = 30, HELP_WIDTH = 56, PAGE_WIDTH = 96 };
+
+static void print_option(const cli_option *option) {
+    char left[128];
+    const char letter = cli_letter_of(option->name);
+    int used = letter != '\0' ? snprintf(left, sizeof left, "  -%c, --%s", letter, option->name)
+                              : snprintf(left, sizeof left, "      --%s", option->name);
+    if (option->value != NULL) {
+        used += snprintf(left + used, sizeof left - (size_t)used, " %s", option->value);
+    }
+    fputs(left, stdout);
+    int columns = count_characters(left, (size_t)used);
+    if (columns >= HELP_COLUMN) {
+        putchar('\n');
+        columns = 0;
+    }
+    const text t = {.out = stdout, .width = HELP_WIDTH, .lead = HELP_COLUMN - columns, .indent = HELP_COLUMN};
+    write_text(t, option->help);
+}
+
+void cli_print_help(const cli_command *command) {
+    cli_option list[CLI_MOST_OPTIONS];
+    const size_t count = cli_list_options(command, list);
+    printf("Usage: vdbshade %s %s\n\n%s\n", command->name, command->usage, command->summary);
+    for (size_t i = 0; i < count; ++i) {
+        if (list[i].kind == CLI_KIND_HEADING) {
+            printf("\n%s:\n", list[i].help);
+        } else {
+            print_option(&list[i]);
+        }
+    }
+}
+
+static void print_commands(void) {
+    printf("Usage: vdbshade COMMAND …\n\n%s\n\nCommands:\n", summary);
+    for (size_t i = 0; commands[i] != NULL; ++i) {
+        printf("  %-10s %s\n", commands[i]->name, commands[i]->brief);
+    }
+    printf("\n"
+           "  vdbshade COMMAND --help   options of a command\n"
+           "  vdbshade help             pages of the manual too\n"
+           "  vdbshade --version        version\n\n");
+    text t = {.out = stdout, .width = PAGE_WIDTH};
+    add_words(&t, "Exit codes:");
+    for (size_t i = 0; i < CLI_COUNT(exits); ++i) {
+        char line[96];
+        snprintf(line, sizeof line, " %d %s%s", exits[i].code, exits[i].meaning,
+                 i + 1 < CLI_COUNT(exits) ? ";" : ".");
+        add_words(&t, line);
+    }
+    write_text(t, errors);
+}
+
+/* --- man pages in the man macros, man(7), without a date: the same build gives the same page */
+
+enum { MAN_WIDTH = 56 }; /* with what escapes add, lines stay below 80 bytes */
+
+/* Writes a word literally. Dashes are minus signs, which can be copied. */
+static void put_literally(FILE *out, const char *word, int length, bool first) {
+    if (first && (word[0] == '.' || word[0] == '\'')) {
+        fputs("\\&", out);
+    }
+    for (int i = 0; i < length; ++i) {
+        if (word[i] == '\\' || word[i] == '-') {
+            fputs(word[i] == '-' ? "\\-" : "\\e", out);
+        } else {
+            fputc(word[i], out);
+        }
+    }
+}
+
+static void write_paragraph(FILE *out, const char *words) {
+    write_text((text){.out = out, .width = MAN_WIDTH, .put = put_literally}, words);
+}
+
+static void put_in_font(FILE *out, char font, const char *word, int length) {
+    fprintf(out, "\\f%c", font);
+    put_literally(out, word, length, false);
+    fputs("\\fR", out);
+}
+
+/* Options are bold, placeholders in italics. */
+static void put_usage(FILE *out, const char *word, int length, bool first) {
+    (void)first;
+    put_in_font(out, word[0] == '-' ? 'B' : 'I', word, length);
+}
+
+/* Writes " INPUT -o OUT [options]". */
+static void write_usage(FILE *out, const char *usage) {
+    write_text((text){.out = out, .width = INT_MAX, .lead = 1, .put = put_usage}, usage);
+}
+
+static void write_title(FILE *out, const char *name) {
+    fprintf(out, ".\\\" Made by 'vdbshade help --man'.\n.TH ");
+    for (const char *c = name; *c != '\0'; ++c) {
+        fputc(toupper((unsigned char)*c), out);
+    }
+    fprintf(out, " 1 \"\" \"vdbshade %s\" \"vdbshade\"\n", vsh_version());
+}
+
+static void write_option(FILE *out, const cli_option *option) {
+    fputs(".TP\n", out);
+    if (cli_letter_of(option->name) != '\0') {
+        fprintf(out, "\\fB\\-%c\\fR, ", cli_letter_of(option->name));
+    }
+    char name[72];
+    snprintf(name, sizeof name, "--%s", option->name);
+    put_in_font(out, 'B', name, (int)strlen(name));
+    if (option->value != NULL) {
+        fputc(' ', out);
+        put_in_font(out, 'I', option->value, (int)strlen(option->value));
+    }
+    fputc('\n', out);
+    write_paragraph(out, option->help);
+}
+
+/* Writes the exit codes, and the names of all other pages. */
+static void write_end(FILE *out, const cli_command *command) {
+    fputs(".SH EXIT STATUS\n", out);
+    for (size_t i = 0; i < CLI_COUNT(exits); ++i) {
+        fprintf(out, ".TP\n\\fB%d\\fR\n", exits[i].code);
+        write_paragraph(out, exits[i].meaning);
+    }
+    fputs(".PP\n", out);
+    write_paragraph(out, errors);
+    fputs(command != NULL ? ".SH SEE ALSO\n.BR vdbshade (1)" : ".SH SEE ALSO", out);
+    size_t listed = command != NULL;
+    for (size_t i = 0; commands[i] != NULL; ++i) {
+        if (commands[i] != command) {
+            fprintf(out, "%s\n.BR vdbshade\\-%s (1)", listed++ > 0 ? "," : "", commands[i]->name);
+        }
+    }
+    fputs("\n.PP\n", out);
+    write_paragraph(out, "'vdbshade help' lists the pages of the manual.");
+}
+
+static void write_program_page(FILE *out) {
+    write_title(out, "vdbshade");
+    fputs(".SH NAME\nvdbshade \\- soft shadows and ambient occlusion from signed distance fields\n"
+          ".SH SYNOPSIS\n\\fBvdbshade\\fR \\fICOMMAND\\fR ...\n.br\n"
+          "\\fBvdbshade\\fR \\fICOMMAND\\fR \\fB\\-\\-help\\fR\n.br\n\\fBvdbshade \\-\\-version\\fR\n.SH "
+          "DESCRIPTION\n",
+          out);
+    write_paragraph(out, summary);
+    fputs(".SH COMMANDS\n", out);
+    for (size_t i = 0; commands[i] != NULL; ++i) {
+        fprintf(out, ".TP\n\\fB%s\\fR", commands[i]->name);
+        write_usage(out, commands[i]->usage);
+        write_paragraph(out, commands[i]->brief);
+    }
+    write_end(out, NULL);
+}
+
+/* Writes the man page of a command, or (NULL) of the program. */
+static void write_man(FILE *out, const cli_command *command) {
+    if (command == NULL) {
+        write_program_page(out);
+        return;
+    }
+    char name[64];
+    snprintf(name, sizeof name, "vdbshade-%s", command->name);
+    write_title(out, name);
+    fprintf(out, ".SH NAME\nvdbshade\\-%s \\-\n", command->name);
+    write_paragraph(out, command->brief);
+    fprintf(out, ".SH SYNOPSIS\n\\fBvdbshade %s\\fR", command->name);
+    write_usage(out, command->usage);
+    fputs(".SH DESCRIPTION\n", out);
+    write_paragraph(out, command->summary);
+    fputs(".SH OPTIONS\n", out);
+    cli_option options[CLI_MOST_OPTIONS];
+    const size_t count = cli_list_options(command, options);
+    for (size_t i = 0; i < count; ++i) {
+        if (options[i].kind != CLI_KIND_HEADING) {
+            write_option(out, &options[i]);
+        } else {
+            fputs(".SS ", out);
+            write_paragraph(out, options[i].help);
+        }
+    }
+    write_end(out, command);
+}
+
+/* --- the command `help` */
+
+typedef struct help_settings {
+    const char *folder;
+    bool man;
+} help_settings;
+
+static const cli_option options[] = {
+    {.help = "Options"},
+    {"man", NULL, "print the man page of the command, or of vdbshade", CLI_VALUE(FLAG, help_settings, man)},
+    {"write", "FOLDER", "write all man pages there, as packages install them",
+     CLI_VALUE(TEXT, help_settings, folder)},
+    CLI_HELP_OPTION,
+};
+
+/* Finds "scene", "scene.md" or "docs/scene.md", in any case. */
+static const cli_page *find_page(const char *topic) {
+    const char *name = strncmp(topic, "docs/", 5) == 0 ? topic + 5 : topic;
+    const size_t length = strlen(name) - (cli_has_ending(name, "md") ? 3 : 0);
+    for (const cli_page *page = cli_pages; page->name != NULL; ++page) {
+        if (strlen(page->name) == length && strncasecmp(page->name, name, length) == 0) {
+            return page;
+        }
+    }
+    return NULL;
+}
+
+static void list_topics(void) {
+    print_commands();
+    printf("\nPages of the manual, 'vdbshade help TOPIC':\n");
+    for (const cli_page *page = cli_pages; page->name != NULL; ++page) {
+        const bool hidden = find_command(page->name) != NULL;
+        const char *title = (const char *)page->bytes; /* "# Scene files" */
+        const char *end = memchr(title, '\n', page->size);
+        const int length = end != NULL && title[0] == '#' ? (int)(end - title) - 2 : 0;
+        printf("  %s%-*s %.*s\n", hidden ? "docs/" : "", hidden ? 12 : 17, page->name, length, title + 2);
+    }
+}
+
+/* Returns the command, or also the page, whose name is nearest to `topic`; NULL if none is near. */
+static const char *find_nearest(const char *topic, bool has_pages) {
+    enum { MOST = 128 };
+    const char *names[MOST];
+    size_t count = 0;
+    for (size_t i = 0; commands[i] != NULL; ++i) {
+        names[count++] = commands[i]->name;
+    }
+    for (const cli_page *page = cli_pages; has_pages && count < MOST && page->name != NULL; ++page) {
+        names[count++] = page->name;
+    }
+    return cli_nearest(topic, names, count);
+}
+
+static int print_topic(const char *topic, bool man) {
+    const cli_command *command = find_command(topic);
+    const cli_page *page = find_page(topic);
+    if (command == NULL && page == NULL) {
+        const char *near = find_nearest(topic, true);
+        CLI_REFUSE_IF(near != NULL, "help: %s: no such topic; did you mean %s?", topic, near);
+        return cli_usage("help: %s: no such topic; 'vdbshade help' lists them", topic);
+    }
+    if (command != NULL && man) {
+        write_man(stdout, command);
+    } else if (command != NULL) {
+        cli_print_help(command);
+        if (page != NULL) {
+            printf("\nThe manual's page: vdbshade help docs/%s.md\n", topic);
+        }
+    } else if (man) {
+        return cli_usage("--man: %s is no command", topic);
+    } else {
+        fwrite(page->bytes, 1, page->size, stdout);
+    }
+    return CLI_OK;
+}
+
+/* Writes the man page of a command, or (NULL) of the program, to a file. */
+static int write_page(const char *folder, const cli_command *command) {
+    const char *path = cli_keep_text("%s/share/man/man1/vdbshade%s%s.1", folder, command != NULL ? "-" : "",
+                                     command != NULL ? command->name : "");
+    CLI_TRY(cli_make_folder_of(path));
+    cli_temporary page;
+    CLI_TRY(cli_temporary_begin(&page, path));
+    write_man(page.file, command);
+    return cli_temporary_commit(&page);
+}
+
+static int help_main(int argc, char **argv) {
+    help_settings s = {.folder = NULL};
+    const char *topic;
+    CLI_TRY(cli_parse(&cli_help, argc, argv, &s, &topic));
+    CLI_REFUSE_IF(s.folder != NULL && (topic != NULL || s.man),
+                  "help: --write goes alone, not with TOPIC or --man");
+    if (s.folder != NULL) {
+        CLI_TRY(write_page(s.folder, NULL));
+        for (size_t i = 0; commands[i] != NULL; ++i) {
+            CLI_TRY(write_page(s.folder, commands[i]));
+        }
+    } else if (topic != NULL) {
+        return print_topic(topic, s.man);
+    } else if (s.man) {
+        write_man(stdout, NULL);
+    } else {
+        list_topics();
+    }
+    return CLI_OK;
+}
+
+const cli_command cli_help = {
+    "help", "[TOPIC] [options]", "help of a command, or a page of the manual",
+    "Prints the help of a command, or a page of the manual (docs/*.md): 'vdbshade help scene'. A page\n"
+    "that has a command's name is printed by 'vdbshade help docs/query.md'. Without TOPIC it lists both.",
+    CLI_ENDING(options, help_main)};
+
+/* --- the program */
+
+static int run_command(int argc, char **argv) {
+    CLI_REFUSE_IF(argc < 2, "no command; see 'vdbshade --help'");
     if (strcmp(argv[1], "--help") == 0 || strcmp(argv[1], "-h") == 0) {
-        cli_print_commands();
+        print_commands();
         return CLI_OK;
     }
-    if (strcmp(argv[1], "--version") == 0) {
+    if (strcmp(argv[1], "--version") == 0 || strcmp(argv[1], "-V") == 0) {
         printf("vdbshade %s\n", vsh_version());
         return CLI_OK;
     }
-    const cli_command_row *row = cli_find_command(argv[1]);
-    if (row == NULL) {
-        return unknown_command(argv[1]);
-    }
-    if (row->command != &cli_query) { /* which may write points there */
+    const cli_command *command = find_command(argv[1]);
+    const char *near = command == NULL && argv[1][0] != '-' ? find_nearest(argv[1], false) : NULL;
+    CLI_REFUSE_IF(near != NULL, "%s: no such command; did you mean %s?", argv[1], near);
+    CLI_REFUSE_IF(command == NULL, "%s: no such %s; see 'vdbshade --help'", argv[1],
+                  argv[1][0] == '-' ? "option" : "command");
+    if (command != &cli_query) { /* `query` may write binary points there */
         cli_plain_output();
     }
-    return row->command->main(argc - 1, argv + 1);
+    return command->main(argc - 1, argv + 1);
 }
 
 #ifndef SYS_landlock_create_ruleset
 #define SYS_landlock_create_ruleset 444
 #endif
 
-/* Sanitizers look into their own process by way of another. */
+/* Sanitizers read the memory of their process through another process. */
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define SANITIZED 1
 #elif defined(__has_feature)
@@ -62,9 +430,9 @@ static int dispatch(int argc, char **argv) {
 #define SANITIZED 0
 #endif
 
-/* A reader that a file has taken over is kept by Landlock from the memory and environment of other processes.
- * Where the kernel has no Landlock, this process closes its own before any file is read. That shuts debuggers
- * and core files out, too, so it is not done elsewhere. */
+/* Landlock keeps a reader, which a damaged file may control, from the memory and environment of other
+ * processes. Without Landlock this process closes its own. That stops debuggers and core files too, so it is
+ * the exception. */
 static void close_own_memory(void) {
     enum { ASK_VERSION = 1 };
     if (!SANITIZED && syscall(SYS_landlock_create_ruleset, NULL, 0, ASK_VERSION) < 1) {
@@ -75,17 +443,16 @@ static void close_own_memory(void) {
 int main(int argc, char **argv) {
     const int served = vsh_reader_serve(argc, argv);
     if (served >= 0) {
-        _exit(served); /* what it holds goes with it */
+        _exit(served); /* without freeing memory */
     }
     close_own_memory();
     cli_signals_begin();
-    int code = dispatch(argc, argv);
+    int code = run_command(argc, argv);
     code = code == CLI_HELP ? CLI_OK : code;
-    cli_progress_end();
-    cli_warnings_tell();
+    cli_end_progress();
+    cli_print_warnings();
     if ((fflush(stdout) != 0 || ferror(stdout)) && code == CLI_OK) {
-        cli_say("standard output: cannot be written: %s", strerror(errno));
-        code = CLI_FILE;
+        code = cli_refuse(CLI_FILE, "standard output: cannot be written: %s", strerror(errno));
     }
     return code;
 }

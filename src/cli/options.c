@@ -1,110 +1,148 @@
 /* The parser of command lines, and their help. */
-#include "options.h"
+#include "base/text.h"
+#include "cli.h"
 
-#include "base/suggest.h"
-#include "message.h"
-#include "paths.h"
-#include "progress.h"
-#include "warnings.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include <errno.h>
 #include <sys/resource.h>
 #include <unistd.h>
-#include <vdbshade/reader.h>
 
-enum { HELP_COLUMN = 30, HELP_WIDTH = 56 };
+cli_common cli_given;
+cli_line cli_parsed;
 
 /* --- settings of the library */
 
-typedef struct setting_text {
-    vsh_setting setting;
-    char help[sizeof(vsh_setting)];
-} setting_text;
-
-static setting_text listed[CLI_MOST_SETTINGS]; /* read once */
+static vsh_setting listed[CLI_MOST_SETTINGS]; /* read once */
+static const char *listed_help[CLI_MOST_SETTINGS];
 static size_t listed_count;
 
-static void tell_help(const vsh_setting *s, char *help, size_t size) {
+/* Formats "HELP, RANGE (DEFAULT)" or "HELP: NAMES (DEFAULT)". */
+static const char *format_help(const vsh_setting *s) {
     const bool counts = strchr("0123456789ma", s->range[0]) != NULL && strchr(s->range, ',') == NULL;
-    const bool plain = s->range[0] == '\0', always = s->otherwise[0] == '\0';
-    snprintf(help, size, "%s%s%s%s%s%s", s->help,
-             plain    ? ""
-             : counts ? ", "
-                      : ": ",
-             s->range, always ? "" : " (", s->otherwise, always ? "" : ")");
+    const char *separator = s->range[0] == '\0' ? "" : counts ? ", " : ": ";
+    return s->otherwise[0] == '\0' ? cli_keep_text("%s%s%s", s->help, separator, s->range)
+                                   : cli_keep_text("%s%s%s (%s)", s->help, separator, s->range, s->otherwise);
 }
 
 const vsh_setting *cli_setting(size_t index) {
-    vsh_setting setting;
-    while (listed_count < CLI_MOST_SETTINGS && vsh_setting_get(listed_count, &setting) != 0) {
-        setting_text *text = &listed[listed_count++];
-        text->setting = setting;
-        tell_help(&setting, text->help, sizeof text->help);
+    while (listed_count < CLI_MOST_SETTINGS && vsh_setting_get(listed_count, &listed[listed_count]) != 0) {
+        listed_help[listed_count] = format_help(&listed[listed_count]);
+        ++listed_count;
     }
-    return index < listed_count ? &listed[index].setting : NULL;
+    return index < listed_count ? &listed[index] : NULL;
 }
 
-/* The setting that a row stands for by its group or, where it has one, by its option's name; from *at on. */
-static const vsh_setting *next_setting(const cli_option *row, size_t *at) {
-    const vsh_setting *setting;
-    while ((setting = cli_setting(*at)) != NULL) {
-        ++*at;
-        if (row->name != NULL ? strcmp(setting->option, row->name) == 0
-                              : setting->group == row->key - CLI_KEY_SETTINGS) {
-            return setting;
+/* Sets a setting of `owner`: a vsh_scene, vsh_receiver or vsh_flat_scene. */
+static int set(const vsh_setting *setting, const char *text, void *owner) {
+    const char *name = cli_keep_text("--%s", setting->option);
+    switch (setting->owner) {
+    case VSH_SETTING_OF_SCENE:
+        return cli_check(vsh_scene_set(owner, name, text, &cli_error));
+    case VSH_SETTING_OF_RECEIVER:
+        return cli_check(vsh_receiver_set(owner, name, text, &cli_error));
+    default:
+        return cli_check(vsh_flat_scene_set(owner, name, text, &cli_error));
+    }
+}
+
+/* Stores the value of a setting, and checks it at once, before any file is read. */
+static int give_setting(size_t index, const char *value) {
+    vsh_scene scene = vsh_scene_default();
+    vsh_receiver receiver = vsh_receiver_default();
+    vsh_flat_scene flat = vsh_flat_scene_default();
+    void *const owners[] = {[VSH_SETTING_OF_SCENE] = &scene,
+                            [VSH_SETTING_OF_RECEIVER] = &receiver,
+                            [VSH_SETTING_OF_FLAT] = &flat};
+    const vsh_setting *setting = cli_setting(index);
+    cli_parsed.settings[index] = value != NULL ? value : "true";
+    return set(setting, cli_parsed.settings[index], owners[setting->owner]);
+}
+
+int cli_set_default(const char *option, const char *value) {
+    for (size_t i = 0; cli_setting(i) != NULL; ++i) {
+        if (strcmp(cli_setting(i)->option, option) == 0) {
+            return cli_was_given(option) ? CLI_OK : give_setting(i, value);
+        }
+    }
+    return CLI_OK;
+}
+
+int cli_apply_settings(int32_t owner, void *target) {
+    if (owner == VSH_SETTING_OF_SCENE && cli_parsed.rule_count > 0) {
+        vsh_scene *scene = target;
+        scene->solidity = cli_parsed.rules;
+        scene->solidity_count = cli_parsed.rule_count;
+    }
+    for (size_t i = 0; cli_setting(i) != NULL; ++i) {
+        if (cli_parsed.settings[i] != NULL && cli_setting(i)->owner == owner) {
+            CLI_TRY(set(cli_setting(i), cli_parsed.settings[i], target));
+        }
+    }
+    return CLI_OK;
+}
+
+/* --- tables of options */
+
+/* Finds the option of a name or, if `letter` is not 0, of a letter. */
+static const cli_option *find_option(const cli_option *options, size_t count, const char *name, char letter) {
+    for (size_t i = 0; i < count; ++i) {
+        if (options[i].name != NULL && (letter != '\0' ? cli_letter_of(options[i].name) == letter
+                                                       : strcmp(options[i].name, name) == 0)) {
+            return &options[i];
         }
     }
     return NULL;
 }
 
-size_t cli_list_options(const cli_command *command, cli_option *options, size_t most) {
+size_t cli_list_options(const cli_command *command, cli_option options[CLI_MOST_OPTIONS]) {
     size_t count = 0;
-    for (size_t i = 0; i < command->option_count && count < most; ++i) {
-        const cli_option *option = &command->options[i];
-        if (option->key < CLI_KEY_SETTINGS || option->key >= CLI_STORE_TEXT) {
-            options[count] = *option;
-            if (option->name != NULL && strcmp(option->name, "output") == 0) {
-                options[count].key = 'o';
-            }
-            ++count;
+    for (size_t i = 0; i < command->option_count; ++i) {
+        const cli_option *row = &command->options[i];
+        if (row->kind != CLI_KIND_SETTINGS && row->kind != CLI_KIND_SETTING) {
+            options[count++] = *row;
             continue;
         }
         const vsh_setting *setting;
-        for (size_t at = 0; count < most && (setting = next_setting(option, &at)) != NULL;) {
-            const char *value = setting->value[0] != '\0' ? setting->value : NULL;
-            options[count++] =
-                (cli_option){CLI_KEY_SETTING + (int)at - 1, setting->option, value, listed[at - 1].help};
-            if (option->name != NULL) {
-                break; /* others may have the name, too */
+        for (size_t k = 0; (setting = cli_setting(k)) != NULL; ++k) {
+            const bool wanted = row->kind == CLI_KIND_SETTING ? strcmp(setting->option, row->name) == 0
+                                                              : setting->group == (int32_t)row->place;
+            if (wanted && find_option(options, count, setting->option, 0) == NULL) {
+                options[count++] = (cli_option){
+                    setting->option, setting->value[0] != '\0' ? setting->value : NULL,
+                    row->help != NULL ? row->help : listed_help[k], .kind = CLI_KIND_SETTING, .place = k};
             }
         }
     }
     return count;
 }
 
+char cli_letter_of(const char *option) {
+    const bool has = strcmp(option, "help") == 0 || strcmp(option, "output") == 0 ||
+                     strcmp(option, "quiet") == 0 || strcmp(option, "verbose") == 0;
+    return has ? option[0] : '\0';
+}
+
 bool cli_find_option(const cli_command *command, const char *word, cli_option *option) {
     cli_option list[CLI_MOST_OPTIONS];
-    const size_t count = cli_list_options(command, list, CLI_MOST_OPTIONS);
-    const size_t length = word[1] == '-' ? strcspn(word + 2, "=") : 0;
-    for (size_t i = 0; i < count; ++i) {
-        const bool named = length > 0 && list[i].key != 0 && strlen(list[i].name) == length &&
-                           strncmp(list[i].name, word + 2, length) == 0;
-        if (named || (length == 0 && list[i].key == word[1])) {
-            *option = list[i];
+    const char letter = word[1] != '-' ? word[1] : '\0', *name = word + 2;
+    const cli_option *found =
+        find_option(list, cli_list_options(command, list),
+                    letter == '\0' ? cli_keep_text("%.*s", (int)strcspn(name, "="), name) : "", letter);
+    *option = found != NULL ? *found : (cli_option){.name = NULL};
+    return found != NULL;
+}
+
+bool cli_was_given(const char *option) {
+    for (size_t i = 0; i < cli_parsed.option_count; ++i) {
+        if (strcmp(cli_parsed.options[i], option) == 0) {
             return true;
         }
     }
     return false;
 }
 
-/* --- words that are none */
-
 const char *cli_nearest(const char *text, const char *const *candidates, size_t count) {
     const char *nearest = NULL;
-    const size_t length = strlen(text);
-    size_t best = 1 + (length > 6 ? length / 3 : 2);
+    size_t best = 1 + (strlen(text) > 6 ? strlen(text) / 3 : 2);
     for (size_t i = 0; i < count; ++i) {
         const size_t distance = vshi_edit_distance(text, candidates[i]);
         if (distance < best) {
@@ -115,6 +153,137 @@ const char *cli_nearest(const char *text, const char *const *candidates, size_t 
     return nearest;
 }
 
+/* --- values */
+
+/* strtod() and strtoll() also skip leading blanks. */
+static bool starts_number(const char *text) {
+    return *text != '\0' && strchr("+-.0123456789", *text) != NULL;
+}
+
+static bool read_number(const char *text, double *value, const char **rest) {
+    char *end = NULL;
+    if (!starts_number(text) || strpbrk(text, "xXpP") != NULL) {
+        return false;
+    }
+    *value = strtod(text, &end);
+    *rest = end;
+    return end != text && isfinite(*value);
+}
+
+bool cli_read_numbers(const char *text, size_t count, double *value) {
+    bool good = true;
+    for (size_t i = 0; i < count && good; ++i) {
+        good = read_number(text, &value[i], &text) && *text == (i + 1 < count ? ',' : '\0');
+        ++text;
+    }
+    return good;
+}
+
+bool cli_read_integer(const char *text, int32_t *value, const char **rest) {
+    char *end = NULL;
+    errno = 0;
+    const long long number = starts_number(text) ? strtoll(text, &end, 10) : 0;
+    *rest = end;
+    *value = (int32_t)number;
+    return end != NULL && end != text && errno == 0 && number >= INT32_MIN && number <= INT32_MAX;
+}
+
+/* Reads "W" or "WxH". */
+static bool read_size(const char *text, int32_t size[2]) {
+    const char *at;
+    if (!cli_read_integer(text, &size[0], &at)) {
+        return false;
+    }
+    size[1] = size[0];
+    return (*at == '\0' || (*at == 'x' && cli_read_integer(at + 1, &size[1], &at) && *at == '\0')) &&
+           size[0] >= 1 && size[0] <= VSH_MAX_LIGHTMAP_SIZE && size[1] >= 1 &&
+           size[1] <= VSH_MAX_LIGHTMAP_SIZE;
+}
+
+static bool read_bytes(const char *text, uint64_t *value) {
+    static const struct {
+        const char *suffix;
+        double factor;
+    } units[] = {{"", 1.0},       {"k", 1e3},      {"M", 1e6},     {"G", 1e9},
+                 {"KiB", 0x1p10}, {"MiB", 0x1p20}, {"GiB", 0x1p30}};
+    double number;
+    const char *rest;
+    if (read_number(text, &number, &rest) && number >= 0.0) {
+        for (size_t i = 0; i < CLI_COUNT(units); ++i) {
+            if (strcmp(rest, units[i].suffix) == 0 && number * units[i].factor < 0x1p62) {
+                *value = (uint64_t)(number * units[i].factor);
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
+/* Reads the number of a word in "a|b|c". */
+static bool read_word(const char *text, const char *words, int32_t *value) {
+    const size_t length = strlen(text);
+    *value = 0;
+    for (const char *at = words; *at != '\0'; ++*value) {
+        const size_t size = strcspn(at, "|");
+        if (size == length && strncmp(at, text, size) == 0) {
+            return true;
+        }
+        at += size + (at[size] != '\0');
+    }
+    return false;
+}
+
+/* Lists the names of a VSH_NAMES_… kind. */
+static const char *list_names(int32_t kind) {
+    const char *list = "one of", *name;
+    for (int32_t i = 0; (name = vsh_get_name(kind, i)) != NULL; ++i) {
+        list = cli_keep_text("%s%s %s", list, i > 0 ? "," : "", name);
+    }
+    return list;
+}
+
+static int add_item(cli_list *list, size_t most, const char *name, const char *value) {
+    CLI_REFUSE_IF(value[0] == '\0', "%s: expected a name", name);
+    CLI_REFUSE_IF(list->count == most, "%s '%s': given more than %zu times", name, value, most);
+    list->text[list->count++] = value;
+    return CLI_OK;
+}
+
+/* Splits PATTERN=X, *x is behind the last '='. Names may contain one. */
+static const char *split_pattern(const char *value, const char **x) {
+    const char *sign = strrchr(value, '=');
+    *x = sign != NULL ? sign + 1 : NULL;
+    return sign == NULL || sign == value ? NULL : cli_keep_text("%.*s", (int)(sign - value), value);
+}
+
+int cli_parse_treat(void *unused, const char *name, const char *value) {
+    static const int32_t solidity[] = {VSH_SOLIDITY_SOLID, VSH_SOLIDITY_SHELL, VSH_SOLIDITY_INWARD};
+    const char *x, *pattern = split_pattern(value, &x);
+    int32_t word;
+    (void)unused;
+    CLI_REFUSE_IF(cli_parsed.rule_count == CLI_MOST_RULES, "%s '%s': given more than %d times", name, value,
+                  CLI_MOST_RULES);
+    CLI_REFUSE_IF(pattern == NULL || !read_word(x, "solid|sheet|room", &word),
+                  "%s '%s': expected PATTERN=solid, PATTERN=sheet or PATTERN=room", name, value);
+    cli_parsed.rules[cli_parsed.rule_count++] = (vsh_solidity_rule){pattern, solidity[word]};
+    return CLI_OK;
+}
+
+int cli_parse_density(void *at, const char *name, const char *value) {
+    cli_densities *densities = at;
+    vsh_density_rule rule;
+    const char *x;
+    rule.pattern = split_pattern(value, &x);
+    CLI_REFUSE_IF(rule.pattern == NULL || !cli_read_numbers(x, 1, &rule.factor) || !(rule.factor > 0.0),
+                  "%s '%s': expected PATTERN=X, a number greater than 0", name, value);
+    CLI_REFUSE_IF(densities->count == CLI_MOST_DENSITIES, "%s '%s': given more than %d times", name, value,
+                  CLI_MOST_DENSITIES);
+    densities->list[densities->count++] = rule;
+    return CLI_OK;
+}
+
+/* --- parsing */
+
 enum { MOST_OPERANDS = 2 };
 
 /* A command line that is being parsed. */
@@ -122,219 +291,155 @@ typedef struct parsing {
     const cli_command *command;
     int argc;
     char **argv;
+    void *settings;
     const char *operands[MOST_OPERANDS + 1]; /* the first ones */
     int operand_count;
-    FILE *told; /* the command line as outputs tell it */
+    FILE *record; /* the line for provenance */
 } parsing;
 
 static int unknown_option(const parsing *p, const char *text) {
     cli_option list[CLI_MOST_OPTIONS];
-    const size_t rows = cli_list_options(p->command, list, CLI_MOST_OPTIONS);
-    const char *names[CLI_MOST_OPTIONS];
+    const size_t rows = cli_list_options(p->command, list);
+    const char *names[CLI_MOST_OPTIONS], *word = text + strspn(text, "-");
     size_t count = 0;
     for (size_t i = 0; i < rows; ++i) {
-        if (list[i].key != 0) {
-            names[count++] = list[i].name;
-        }
+        names[count] = list[i].name;
+        count += list[i].name != NULL;
     }
-    char word[64];
-    snprintf(word, sizeof word, "%s", text + strspn(text, "-"));
-    word[strcspn(word, "=")] = '\0';
-    const char *near = cli_nearest(word, names, count);
-    if (near != NULL) {
-        return cli_usage("%s: no such option; did you mean --%s?", text, near);
-    }
-    return cli_usage("%s: no such option; see 'vdbshade %s --help'", text, p->command->name);
+    const char *near = cli_nearest(cli_keep_text("%.*s", (int)strcspn(word, "="), word), names, count);
+    return near != NULL ? cli_usage("%s: no such option; did you mean --%s?", text, near)
+                        : cli_usage("%s: no such option; see 'vdbshade %s --help'", text, p->command->name);
 }
 
-/* --- the command line as outputs tell it */
-
-static char *parsed_command; /* of the process's one command line at a time */
-static const char *parsed_grid;
-
-const char *cli_parsed_grid(void) {
-    return parsed_grid;
-}
-
-const char *cli_parsed_command(void) {
-    return parsed_command != NULL ? parsed_command : "";
-}
-
-/* Writes a word behind a blank, quoted as a shell would have it. */
-static void tell_word(FILE *told, const char *word) {
+/* Records a word after a blank, quoted as a shell needs it. */
+static void record_word(FILE *record, const char *word) {
     static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_-+=.,:/@%";
     if (word[0] != '\0' && strspn(word, plain) == strlen(word)) {
-        fprintf(told, " %s", word);
+        fprintf(record, " %s", word);
         return;
     }
-    fputs(" '", told);
+    fputs(" '", record);
     for (const char *c = word; *c != '\0'; ++c) {
-        fprintf(told, "%s%c", *c == '\'' ? "'\\'" : "", *c);
+        fprintf(record, "%s%c", *c == '\'' ? "'\\'" : "", *c);
     }
-    fputc('\'', told);
+    fputc('\'', record);
 }
 
-static void tell_option(FILE *told, const cli_option *option, const char *value) {
-    static const char *const changes_nothing[] = {
-        "output",  "output-folder", "stats", "threads", "memory-limit", "sandbox", "allow-outside", "quiet",
-        "verbose", "progress",      "json",  "dry-run", "help",         "view",    "shard"};
-    for (size_t i = 0; i < sizeof changes_nothing / sizeof changes_nothing[0]; ++i) {
-        if (strcmp(option->name, changes_nothing[i]) == 0) {
-            return;
-        }
+/* Records an option if it changes values. */
+static void record_option(FILE *record, const cli_option *option, const char *value) {
+    static const char changes_nothing[] =
+        " output output-folder stats threads memory-limit sandbox allow-outside quiet verbose progress json "
+        "dry-run help view shard ";
+    if (strstr(changes_nothing, cli_keep_text(" %s ", option->name)) != NULL) {
+        return;
     }
-    fprintf(told, " --%s", option->name);
+    fprintf(record, " --%s", option->name);
     if (value != NULL) {
-        tell_word(told, strncmp(option->value, "FILE", 4) == 0 ? cli_file_name(value) : value);
+        record_word(record, strncmp(option->value, "FILE", 4) == 0 ? cli_file_name(value) : value);
     }
 }
 
-/* --- parsing */
-
-cli_common cli_given;
-
-/* The machine's memory, or where they are less the control group's (a container) and what the process may
- * address (ulimit -v). 0: not known. */
-static uint64_t machine_memory(void) {
-    const long pages = sysconf(_SC_PHYS_PAGES);
-    const long page = sysconf(_SC_PAGESIZE);
-    uint64_t bytes = pages > 0 && page > 0 ? (uint64_t)pages * (uint64_t)page : 0;
-    static const char *const limits[] = {"/sys/fs/cgroup/memory.max",
-                                         "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
-    for (size_t i = 0; i < sizeof limits / sizeof limits[0]; ++i) {
-        FILE *file = fopen(limits[i], "r");
-        unsigned long long limit = 0;
-        if (file != NULL) {
-            if (fscanf(file, "%llu", &limit) == 1 && limit > 0 && (bytes == 0 || limit < bytes)) {
-                bytes = limit;
-            }
-            fclose(file);
-        }
-    }
-    struct rlimit space;
-    if (getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur != RLIM_INFINITY &&
-        (bytes == 0 || space.rlim_cur < bytes)) {
-        bytes = space.rlim_cur;
-    }
-    return bytes;
-}
-
-vsh_run cli_make_run(void) {
-    vsh_run run = vsh_run_default();
-    run.threads = cli_given.threads;
-    run.memory_limit = cli_given.memory_limit;
-    run.reader = strcmp(cli_given.sandbox, "off") == 0 ? NULL : VSH_READER;
-    run.confined = strcmp(cli_given.sandbox, "require") == 0;
-    run.allow_outside = cli_given.allow_outside;
-    run.progress = cli_progress_report;
-    run.warning = cli_warnings_parse;
-    run.notes = cli_given.verbose;
-    cli_warnings_begin(cli_given.verbose, cli_given.quiet);
-    return run;
-}
-
-static int parse_sandbox(const char *name, const char *value) {
-    if (strcmp(value, "auto") != 0 && strcmp(value, "require") != 0 && strcmp(value, "off") != 0) {
-        return cli_usage("%s '%s': expected auto, require or off", name, value);
-    }
-    cli_given.sandbox = value;
-    return CLI_OK;
-}
-
-/* Stores the value of an option whose key is a place in the settings. */
-static int store(void *settings, int key, const char *name, const char *value) {
-    char *member = (char *)settings + key % CLI_STORE_TEXT;
-    const bool flag = true;
-    double number;
-    switch (key - key % CLI_STORE_TEXT) {
-    case CLI_STORE_TEXT:
-        memcpy(member, &value, sizeof value);
-        return CLI_OK;
-    case CLI_STORE_FLAG:
-        memcpy(member, &flag, sizeof flag);
-        return CLI_OK;
+/* Stores the value of an option. */
+static int store(const cli_option *o, void *settings, const char *name, const char *value) {
+    void *at = o->global != NULL ? o->global : (char *)settings + o->place;
+    double *number = at; /* these two as the kind says */
+    int32_t *integer = at;
+    const char *expected = "", *rest;
+    bool good = true;
+    switch (o->kind) {
+    case CLI_KIND_SETTING:
+        return give_setting(o->place, value);
+    case CLI_KIND_TEXT:
+        *(const char **)at = value;
+        break;
+    case CLI_KIND_FLAG:
+        *(bool *)at = true;
+        break;
+    case CLI_KIND_POSITIVE:
+        good = cli_read_numbers(value, 1, number) && *number > 0.0;
+        expected = "a number greater than 0";
+        break;
+    case CLI_KIND_NUMBER:
+        good = cli_read_numbers(value, 1, number) && *number >= o->least && *number <= o->most;
+        expected = cli_keep_text("a number from %g to %g", o->least, o->most);
+        break;
+    case CLI_KIND_INTEGER:
+        good = cli_read_integer(value, integer, &rest) && *rest == '\0' && *integer >= o->least &&
+               *integer <= o->most;
+        expected = cli_keep_text("a whole number from %.0f to %.0f", o->least, o->most);
+        break;
+    case CLI_KIND_BYTES:
+        good = read_bytes(value, at);
+        expected = "bytes, with k, M, G, KiB, MiB or GiB behind the number";
+        break;
+    case CLI_KIND_NAME:
+        *integer = vsh_find_name((int32_t)o->least, value);
+        good = *integer >= 0;
+        expected = list_names((int32_t)o->least);
+        break;
+    case CLI_KIND_WORD:
+        good = read_word(value, o->value, integer);
+        expected = cli_keep_text("one of %s", o->value);
+        break;
+    case CLI_KIND_POINT:
+        good = cli_read_numbers(value, 3, number);
+        expected = "X,Y,Z, three numbers";
+        break;
+    case CLI_KIND_VECTOR:
+        good =
+            cli_read_numbers(value, 3, number) && (number[0] != 0.0 || number[1] != 0.0 || number[2] != 0.0);
+        expected = "X,Y,Z, three numbers that are not all 0";
+        break;
+    case CLI_KIND_COLOR:
+        good = cli_read_numbers(value, 3, number) && number[0] >= 0.0 && number[1] >= 0.0 && number[2] >= 0.0;
+        expected = "R,G,B, three numbers from 0";
+        break;
+    case CLI_KIND_SIZE:
+        good = read_size(value, integer);
+        expected = cli_keep_text("W or WxH, each from 1 to %d texels", VSH_MAX_LIGHTMAP_SIZE);
+        break;
+    case CLI_KIND_LIST:
+        return add_item(at, (size_t)o->most, name, value);
     default:
-        CLI_TRY(cli_parse_positive(name, value, &number));
-        memcpy(member, &number, sizeof number);
-        return CLI_OK;
+        return o->parse(at, name, value);
     }
+    return good ? CLI_OK : cli_usage("%s '%s': expected %s", name, value, expected);
 }
 
-/* The place in the settings that the command's table gives for the output; else 'o'. */
-static int find_output(const cli_command *command) {
-    for (size_t i = 0; i < command->option_count; ++i) {
-        if (command->options[i].name != NULL && strcmp(command->options[i].name, "output") == 0) {
-            return command->options[i].key;
-        }
-    }
-    return 'o';
-}
-
-static int parse_option(cli_option_fn *take, void *settings, int key, const char *name, const char *value) {
-    switch (key) {
-    case CLI_KEY_THREADS:
-        return cli_parse_integer(name, value, 1, 1024, &cli_given.threads);
-    case CLI_KEY_MEMORY_LIMIT:
-        return cli_parse_bytes(name, value, &cli_given.memory_limit);
-    case CLI_KEY_SANDBOX:
-        return parse_sandbox(name, value);
-    case CLI_KEY_ALLOW_OUTSIDE:
-        cli_given.allow_outside = true;
-        return CLI_OK;
-    case CLI_KEY_QUIET:
-        cli_given.quiet = true;
-        return CLI_OK;
-    case CLI_KEY_VERBOSE:
-        cli_given.verbose = true;
-        return CLI_OK;
-    case CLI_KEY_PROGRESS:
-        cli_given.progress = true;
-        return CLI_OK;
-    default:
-        return key >= CLI_STORE_TEXT ? store(settings, key, name, value) : take(settings, key, name, value);
-    }
-}
-
-/* Parses an option with the value that its word gives, or (NULL) that the next word is, and moves *at there.
- */
-static int parse_value(const parsing *p, cli_option_fn *take, void *settings, const cli_option *option,
-                       const char *value, int *at) {
-    char name[64];
-    snprintf(name, sizeof name, "--%s", option->name);
-    if (value != NULL && option->value == NULL) {
-        return cli_usage("%s: takes no value", name);
-    }
+/* Parses an option. If `value` is NULL, the next word is its value, and *at moves to it. */
+static int parse_option(parsing *p, const cli_option *option, const char *value, int *at) {
+    const char *name = cli_keep_text("--%s", option->name);
+    CLI_REFUSE_IF(value != NULL && option->value == NULL, "%s: takes no value", name);
     if (value == NULL && option->value != NULL) {
-        if (*at + 1 == p->argc) {
-            return cli_usage("%s: needs a value", name);
-        }
+        CLI_REFUSE_IF(*at + 1 == p->argc, "%s: needs a value", name);
         value = p->argv[++*at];
     }
-    if (option->key == 'h') {
+    if (option->kind == CLI_KIND_HELP) {
         cli_print_help(p->command);
         return CLI_HELP;
     }
-    tell_option(p->told, option, value);
-    const int place = option->key == 'o' ? find_output(p->command) : option->key;
-    return parse_option(take, settings, place, name, value);
+    record_option(p->record, option, value);
+    if (!cli_was_given(option->name)) {
+        cli_parsed.options[cli_parsed.option_count++] = option->name;
+    }
+    return store(option, p->settings, name, value);
 }
 
 /* Parses "-q", "-o", "-oVALUE" or "-qo". */
-static int parse_letters(const parsing *p, cli_option_fn *take, void *settings, int *at) {
+static int parse_letters(parsing *p, int *at) {
     cli_option option = {.value = NULL};
     for (const char *c = p->argv[*at] + 1; *c != '\0' && option.value == NULL; ++c) {
         const char letter[] = {'-', *c, '\0'};
         if (!cli_find_option(p->command, letter, &option)) {
             return unknown_option(p, letter);
         }
-        const char *value = option.value != NULL && c[1] != '\0' ? c + 1 : NULL;
-        CLI_TRY(parse_value(p, take, settings, &option, value, at));
+        CLI_TRY(parse_option(p, &option, option.value != NULL && c[1] != '\0' ? c + 1 : NULL, at));
     }
     return CLI_OK;
 }
 
 /* Parses all options, and lists the operands between them and after "--". */
-static int parse_options(parsing *p, cli_option_fn *take, void *settings) {
+static int parse_words(parsing *p) {
     bool ended = false;
     for (int at = 1; at < p->argc; ++at) {
         const char *word = p->argv[at], *sign = strchr(word, '=');
@@ -345,9 +450,9 @@ static int parse_options(parsing *p, cli_option_fn *take, void *settings) {
             if (!cli_find_option(p->command, word, &option)) {
                 return unknown_option(p, word);
             }
-            CLI_TRY(parse_value(p, take, settings, &option, sign != NULL ? sign + 1 : NULL, &at));
+            CLI_TRY(parse_option(p, &option, sign != NULL ? sign + 1 : NULL, &at));
         } else if (!ended && word[0] == '-' && word[1] != '\0') {
-            CLI_TRY(parse_letters(p, take, settings, &at));
+            CLI_TRY(parse_letters(p, &at));
         } else if (p->operand_count <= MOST_OPERANDS) {
             p->operands[p->operand_count++] = word;
         }
@@ -355,118 +460,64 @@ static int parse_options(parsing *p, cli_option_fn *take, void *settings) {
     return CLI_OK;
 }
 
-/* Takes the operands that the usage begins with: "INPUT [OTHER] -o OUT [options]". */
-static int parse_operands(const parsing *p, const char **operands) {
-    const char *command = p->command->name, *at = p->command->usage;
-    char name[32] = "";
+/* Assigns the operands that the usage begins with: "INPUT [OTHER] -o OUT [options]". */
+static int assign_operands(const parsing *p, const char **operands) {
+    const char *command = p->command->name, *at = p->command->usage, *name = "";
     bool optional = false;
     int count = 0;
     for (; *at != '\0' && *at != '-' && strncmp(at, "[options]", strlen("[options]")) != 0; ++count) {
-        const size_t length = strcspn(at, " ");
+        const int length = (int)strcspn(at, " ");
         optional = *at == '[';
-        snprintf(name, sizeof name, "%.*s", (int)length - 2 * optional, at + optional);
+        name = cli_keep_text("%.*s", length - 2 * optional, at + optional);
         operands[count] = count < p->operand_count ? p->operands[count] : NULL;
+        CLI_REFUSE_IF(operands[count] == NULL && !optional, "%s: no %s; see 'vdbshade %s --help'", command,
+                      name, command);
         if (operands[count] != NULL) {
-            tell_word(p->told, cli_file_name(operands[count]));
-        } else if (!optional) {
-            return cli_usage("%s: no %s; see 'vdbshade %s --help'", command, name, command);
+            record_word(p->record, cli_file_name(operands[count]));
         }
-        at += length + strspn(at + length, " ");
+        at += length + (int)strspn(at + length, " ");
     }
-    if (count < p->operand_count) {
-        return cli_usage("%s: one %s is taken, not also '%s'", command, name, p->operands[count]);
-    }
-    parsed_grid = count == 1 && !optional ? cli_split_grid(&operands[0]) : NULL;
-    cli_message_input(operands[0]);
+    CLI_REFUSE_IF(count < p->operand_count, "%s: expected one %s, not also '%s'", command, name,
+                  p->operands[count]);
+    cli_parsed.grid = count == 1 && !optional ? cli_split_grid(&operands[0]) : NULL;
+    cli_parsed.input = operands[0];
+    CLI_REFUSE_IF(cli_was_given("resolution") && cli_was_given("voxel-size"),
+                  "--resolution and --voxel-size: give one of the two");
     return CLI_OK;
 }
 
-int cli_parse(const cli_command *command, int argc, char **argv, cli_option_fn *take, void *settings,
-              const char **operands) {
-    parsing p = {.command = command, .argc = argc, .argv = argv};
-    cli_given = (cli_common){.memory_limit = machine_memory() / 4 * 3, .sandbox = "auto"};
-    free(parsed_command);
-    parsed_command = NULL;
+/* Returns the machine's memory, or the limit of the control group (a container) or of the address space
+ * (ulimit -v) if that is less. */
+static uint64_t find_memory(void) {
+    static const char *const limits[] = {"/sys/fs/cgroup/memory.max",
+                                         "/sys/fs/cgroup/memory/memory.limit_in_bytes"};
+    uint64_t bytes = (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGESIZE);
+    for (size_t i = 0; i < CLI_COUNT(limits); ++i) {
+        FILE *file = fopen(limits[i], "r");
+        uint64_t limit = 0;
+        if (file != NULL) {
+            bytes = fscanf(file, "%" SCNu64, &limit) == 1 && limit > 0 && limit < bytes ? limit : bytes;
+            fclose(file);
+        }
+    }
+    struct rlimit space;
+    return getrlimit(RLIMIT_AS, &space) == 0 && space.rlim_cur < bytes ? space.rlim_cur : bytes;
+}
+
+int cli_parse(const cli_command *command, int argc, char **argv, void *settings, const char **operands) {
+    parsing p = {.command = command, .argc = argc, .argv = argv, .settings = settings};
+    free(cli_parsed.command);
+    cli_given = (cli_common){.quiet = false};
+    cli_run = vsh_run_default();
+    cli_run.memory_limit = find_memory() / 4 * 3;
+    cli_parsed = (cli_line){.command = NULL};
     size_t size;
-    p.told = open_memstream(&parsed_command, &size);
-    fputs(command->name, p.told);
-    int code = parse_options(&p, take, settings);
-    code = code == CLI_OK ? parse_operands(&p, operands) : code;
-    fclose(p.told);
-    if (code == CLI_OK) {
-        cli_progress_begin(cli_given.progress, cli_given.quiet);
-    }
+    p.record = open_memstream(&cli_parsed.command, &size);
+    fputs(command->name, p.record);
+    int code = parse_words(&p);
+    code = code == CLI_OK ? assign_operands(&p, operands) : code;
+    fclose(p.record);
+    cli_complete_run();
+    cli_begin_progress(!cli_given.quiet);
     return code;
-}
-
-static void print_option(const cli_option *option) {
-    char left[128];
-    int used = option->key < 256 ? snprintf(left, sizeof left, "  -%c, --%s", option->key, option->name)
-                                 : snprintf(left, sizeof left, "      --%s", option->name);
-    if (option->value != NULL) {
-        used += snprintf(left + used, sizeof left - (size_t)used, " %s", option->value);
-    }
-    fputs(left, stdout);
-    int columns = cli_text_characters(left, strlen(left));
-    if (columns >= HELP_COLUMN) {
-        putchar('\n');
-        columns = 0;
-    }
-    cli_text text = {
-        .out = stdout, .width = HELP_WIDTH, .lead = HELP_COLUMN - columns, .indent = HELP_COLUMN};
-    cli_text_add(&text, option->help);
-    cli_text_end(&text);
-}
-
-void cli_print_help(const cli_command *command) {
-    cli_option list[CLI_MOST_OPTIONS];
-    const size_t count = cli_list_options(command, list, CLI_MOST_OPTIONS);
-    printf("Usage: vdbshade %s %s\n\n%s\n", command->name, command->usage, command->summary);
-    for (size_t i = 0; i < count; ++i) {
-        if (list[i].key == 0) {
-            printf("\n%s:\n", list[i].help);
-        } else {
-            print_option(&list[i]);
-        }
-    }
-}
-
-int cli_density_take(cli_densities *densities, const char *name, const char *value) {
-    const char *sign = strrchr(value, '='); /* names may have one, numbers have none */
-    if (sign == NULL || sign == value) {
-        return cli_usage("%s '%s': expected PATTERN=X", name, value);
-    }
-    if (densities->count == CLI_MOST_DENSITIES) {
-        return cli_usage("%s: more than %d of them", name, CLI_MOST_DENSITIES);
-    }
-    vsh_density_rule *rule = &densities->list[densities->count];
-    CLI_TRY(cli_parse_positive(name, sign + 1, &rule->factor));
-    rule->pattern = cli_keep_text("%.*s", (int)(sign - value), value);
-    ++densities->count;
-    return CLI_OK;
-}
-
-int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
-                        const vsh_occluders_info *casters, const vsh_run *run, cli_provenance *origin) {
-    *origin = (cli_provenance){NULL, NULL, 0};
-    vsh_provenance_source source = vsh_provenance_source_default();
-    source.scene = scene;
-    source.command = cli_parsed_command();
-    if (casters != NULL) {
-        source.voxel_size = casters->voxel_size;
-        source.has_triangles = casters->has_triangles;
-    }
-    source.files = files;
-    source.file_count = file_count;
-    vsh_error error;
-    if (vsh_provenance_create(&source, run, &origin->made, &error) != VSH_OK) {
-        return cli_fail(&error);
-    }
-    origin->attributes = vsh_provenance_attributes(origin->made, &origin->count);
-    return CLI_OK;
-}
-
-void cli_provenance_free(cli_provenance *origin) {
-    vsh_provenance_free(origin->made);
-    *origin = (cli_provenance){NULL, NULL, 0};
 }

@@ -1,27 +1,24 @@
-#include "signals.h"
-
-#include "base/file.h"
+/* SIGINT, SIGTERM and SIGHUP cancel the work, and memory that the system refuses ends the process at once
+ * (base/guarded_malloc.c), so the command line checks no malloc(). Both remove temporary files. */
 #include "base/memory.h"
-#include "message.h"
+#include "cli.h"
 
 #include <errno.h>
 #include <pthread.h>
 #include <semaphore.h>
 #include <signal.h>
 #include <stdatomic.h>
-#include <stdio.h>
-#include <string.h>
 #include <time.h>
 #include <unistd.h>
 
-/* How long the work may take to stop of itself: a second in all is promised. */
+/* Time for the work to stop. docs/security.md promises a second in all. */
 static const long grace_nanoseconds = 250 * 1000 * 1000;
 
 static sem_t signalled; /* posted by each signal; waited for by the watcher */
 static atomic_bool interrupted;
-static atomic_int written; /* 0: the output is not; else 1 + the exit code */
+static atomic_int written; /* 0: the output is not written; else 1 + the exit code */
 static pthread_mutex_t telling = PTHREAD_MUTEX_INITIALIZER;
-static bool told;                                          /* the user knows; guarded by `telling` */
+static bool told;                                          /* the user knows; protected by `telling` */
 static pthread_mutex_t ending = PTHREAD_MUTEX_INITIALIZER; /* held while the process is ended */
 
 static void on_signal(int number) {
@@ -54,20 +51,20 @@ bool cli_interrupted(void) {
     return atomic_load(&interrupted);
 }
 
-/* Written at once and under its own lock: who ends the process must find the line out already, and must not
- * wait for a thread that is stuck in writing progress. */
+/* Writes at once, under a lock of its own: the line must be out before the process ends, even if another
+ * thread hangs while it writes progress. */
 void cli_signals_tell(void) {
     static const char text[] = "\r\033[Kvdbshade: interrupted\n";
     const size_t skip = isatty(STDERR_FILENO) ? 0 : strlen("\r\033[K");
     pthread_mutex_lock(&telling);
     if (!told && write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
-        /* There is nobody left to tell. */
+        /* Nobody can read it. */
     }
     told = true;
     pthread_mutex_unlock(&telling);
 }
 
-/* A thread, and not the handler, ends the process: it may list a folder and take locks. */
+/* A thread ends the process, not the handler, because a thread may list a folder and take locks. */
 static void *watch(void *unused) {
     (void)unused;
     while (sem_wait(&signalled) != 0) {
@@ -92,7 +89,7 @@ void cli_signals_watch(void) {
     }
 }
 
-/* The lock is kept: a watcher that wakes now waits for it until the process has ended of itself. */
+/* Keeps the lock: a watcher that wakes now waits for it until the process ends. */
 void cli_signals_end(int code) {
     pthread_mutex_lock(&ending);
     atomic_store(&written, code + 1);
@@ -114,7 +111,7 @@ void vshi_memory_refused(size_t bytes) {
     const int size = snprintf(message, sizeof message, "%svdbshade: the system refused memory, %zu bytes\n",
                               isatty(STDERR_FILENO) ? "\r\033[K" : "", bytes);
     if (write(STDERR_FILENO, message, (size_t)size) < 0) {
-        /* There is nobody left to tell. */
+        /* Nobody can read it. */
     }
     _exit(CLI_LIMIT);
 }

@@ -1,26 +1,16 @@
-#include "stats.h"
-
-#include "base/bytes.h"
+/* Statistics of a bake: the file of --stats, the summary, warnings; and the provenance of outputs. */
 #include "base/clock.h"
 #include "base/memory.h"
-#include "message.h"
-#include "signals.h"
-#include "temporary.h"
+#include "cli.h"
 
-#include <inttypes.h>
-#include <jansson.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
 #include <unistd.h>
-#include <vdbshade/reader.h>
 
-static const char *const stage_names[CLI_STAGE_COUNT] = {"load", "voxelize", "field", "bake", "write"};
+static const char *const stage_names[CLI_STAGES] = {"load", "voxelize", "field", "bake", "write"};
 
-double cli_stats_stage(cli_stats *stats, int stage, double since) {
+void cli_stats_lap(cli_stats *stats, int stage) {
     const double now = vshi_seconds();
-    stats->seconds[stage] += now - since;
-    return now;
+    stats->seconds[stage] += now - stats->lap;
+    stats->lap = now;
 }
 
 /* Returns the field's bytes for each active voxel of the level set. */
@@ -30,8 +20,8 @@ static double bytes_per_voxel(const cli_stats *stats) {
 
 static const struct {
     const char *name;   /* in the file */
-    const char *said;   /* in words */
-    const char *option; /* that its method is given by */
+    const char *word;   /* in messages */
+    const char *option; /* that chooses its method */
 } kinds[CLI_STATS_KINDS] = {
     [CLI_STATS_SHADOW] = {"shadow", "shadow", "--method"},
     [CLI_STATS_AO] = {"ao", "AO", "--ao-method"},
@@ -46,13 +36,18 @@ void cli_stats_casters(cli_stats *stats, const vsh_scene *scene, const vsh_occlu
     stats->casters = *casters;
     stats->seconds[CLI_STAGE_VOXELIZE] += stats->casters.voxelize_s;
     stats->seconds[CLI_STAGE_FIELD] += stats->casters.triangles_s + stats->casters.field_s;
+    stats->lap = vshi_seconds();
     cli_stats_methods(stats, scene, stats->casters.has_triangles);
 }
 
 void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_triangles) {
     const vsh_shade_options *shade = &scene->shade;
-    const int32_t method = vsh_shadow_method_resolve(shade->method, has_triangles);
-    const int32_t ao_method = vsh_ao_method_resolve(shade->ao_method, has_triangles);
+    const int32_t method = shade->method != VSH_SHADOW_AUTO ? shade->method
+                           : has_triangles                  ? (int32_t)VSH_SHADOW_EXACT
+                                                            : (int32_t)VSH_SHADOW_ADAPTIVE;
+    const int32_t ao_method = shade->ao_method != VSH_AO_AUTO ? shade->ao_method
+                              : has_triangles                 ? (int32_t)VSH_AO_EXACT
+                                                              : (int32_t)VSH_AO_ADAPTIVE;
     stats->max_error = shade->max_error;
     if (scene->light_count > 0) {
         stats->methods[CLI_STATS_SHADOW] =
@@ -89,56 +84,53 @@ static vsh_bake_error sum_errors(const cli_stats *stats, int kind) {
     return sum;
 }
 
-const char *cli_stats_methods_text(const cli_stats *stats, char *text, size_t size) {
-    size_t used = 0;
+const char *cli_stats_methods_text(const cli_stats *stats) {
+    const char *text = "";
     bool keeps_error = false;
-    text[0] = '\0';
-    for (int kind = 0; kind < CLI_STATS_KINDS && used < size; ++kind) {
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         const cli_method *method = &stats->methods[kind];
         if (method->name != NULL) {
-            used += (size_t)snprintf(text + used, size - used, "%s%s %s", used > 0 ? ", " : "",
-                                     kinds[kind].said, method->name);
+            text =
+                cli_keep_text("%s%s%s %s", text, *text != '\0' ? ", " : "", kinds[kind].word, method->name);
         }
         keeps_error = keeps_error || method->keeps_error;
     }
-    if (keeps_error && used < size) {
-        snprintf(text + used, size - used, ", max error %g", stats->max_error);
-    }
-    return text;
+    return keeps_error ? cli_keep_text("%s, max error %g", text, stats->max_error) : text;
 }
 
-/* Writes what would make the error of a kind smaller. */
-static void write_advice(const cli_stats *stats, const vsh_scene *scene, int kind, char *text, size_t size) {
+/* Tells what would make the error of a kind smaller. */
+static const char *find_advice(const cli_stats *stats, const vsh_scene *scene, int kind) {
     const vsh_bake_error known = sum_errors(stats, kind);
     const bool by_rays = sqrt(known.square_error / known.values) > stats->max_error;
     if (by_rays && scene->shade.rays > 0) {
-        snprintf(text, size, "%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
-    } else if (by_rays) {
-        snprintf(text, size, "the sampler '%s' has no more rays; set \"sampler\": \"sobol\" in the scene",
-                 vsh_get_name(VSH_NAMES_SAMPLER, scene->shade.sampler));
-    } else if (stats->methods[kind].traces) {
-        snprintf(text, size, "values between rays are interpolated; --max-error %.1g keeps it",
-                 0.5 * stats->max_error);
-    } else {
-        const bool can = vsh_scene_traceable(scene, NULL);
-        snprintf(text, size, "%.3g of it comes from voxels of %.3g; %s%ssmaller ones leave less",
-                 vsh_bake_error_field(&known), stats->casters.voxel_size, can ? kinds[kind].option : "",
-                 can ? " exact has none, " : "");
+        return cli_keep_text("%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
     }
+    if (by_rays) {
+        return cli_keep_text("the sampler '%s' has no more rays; set \"sampler\": \"sobol\" in the scene",
+                             vsh_get_name(VSH_NAMES_SAMPLER, scene->shade.sampler));
+    }
+    if (stats->methods[kind].traces) {
+        return cli_keep_text("values between rays are interpolated; --max-error %.1g keeps it",
+                             0.5 * stats->max_error);
+    }
+    bool can = false; /* a mesh or a procedural shape, which rays can meet */
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const int32_t type = scene->casters[i].type;
+        can = can || (type != VSH_CASTER_VDB && type != VSH_CASTER_MASK && type != VSH_CASTER_TEXT);
+    }
+    return cli_keep_text("%.3g of it comes from voxels of %.3g; %s%ssmaller ones leave less",
+                         vsh_bake_error_field(&known), stats->casters.voxel_size,
+                         can ? kinds[kind].option : "", can ? " exact has none, " : "");
 }
 
-void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene, const vsh_run *run) {
+void cli_stats_warn(const cli_stats *stats, const vsh_scene *scene) {
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         const vsh_bake_error known = sum_errors(stats, kind);
         const double error = vsh_bake_error_rmse(&known);
-        if (!stats->methods[kind].keeps_error || !(error > stats->max_error) || run->warning == NULL) {
-            continue;
+        if (stats->methods[kind].keeps_error && error > stats->max_error) {
+            cli_warn("%s: the estimated error is %.3g, above the limit of %g: %s", kinds[kind].word, error,
+                     stats->max_error, find_advice(stats, scene, kind));
         }
-        char line[512], help[256];
-        write_advice(stats, scene, kind, help, sizeof help);
-        snprintf(line, sizeof line, "%s: the estimated error is %.3g, above the limit of %g: %s",
-                 kinds[kind].said, error, stats->max_error, help);
-        run->warning(run->user, line);
     }
 }
 
@@ -152,9 +144,8 @@ static json_t *list_channels(const cli_stats *stats) {
     json_t *channels = json_array();
     for (size_t i = 0; stats->errors != NULL && i < stats->light_count + 2; ++i) {
         const int kind = kind_of(stats, i);
-        char name[96];
-        snprintf(name, sizeof name, "%s%s%.64s", kinds[kind].name, kind == CLI_STATS_SHADOW ? "." : "",
-                 kind == CLI_STATS_SHADOW ? stats->lights[i].name : "");
+        const char *name =
+            kind == CLI_STATS_SHADOW ? cli_keep_text("shadow.%s", stats->lights[i].name) : kinds[kind].name;
         if (stats->methods[kind].name != NULL) {
             json_t *of = json_pack("{s:o}", "name", cli_utf8_json(name));
             set_error(of, &stats->errors[i]);
@@ -196,20 +187,19 @@ static void add_errors(const cli_stats *stats, json_t *root) {
     json_object_set_new(root, "channels", list_channels(stats));
 }
 
-/* Tells how a reader is confined here; null if files were read without one (--sandbox off). */
-static json_t *describe_confinement(const vsh_run *run) {
-    vsh_run quiet = *run;
+/* Describes how a reader is confined here; null if files were read without one (--sandbox off). */
+static json_t *describe_confinement(void) {
+    vsh_run quiet = cli_run;
     quiet.progress = NULL;
     uint32_t confined = 0;
-    vsh_error error;
-    if (run->reader == NULL || vsh_reader_confinement(&quiet, &confined, &error) != VSH_OK) {
+    if (cli_run.reader == NULL || vsh_reader_confinement(&quiet, &confined, &cli_error) != VSH_OK) {
         return json_null();
     }
     return json_pack("{s:b,s:b,s:b}", "limits", confined & VSH_CONFINED_LIMITS, "calls",
                      confined & VSH_CONFINED_CALLS, "files", confined & VSH_CONFINED_FILES);
 }
 
-static int write_file(const cli_stats *stats, const vsh_run *run, const char *path) {
+static int write_file(const cli_stats *stats, const char *path) {
     const struct {
         const char *name;
         uint64_t value;
@@ -237,11 +227,11 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
         {"active_voxels", stats->casters.active_voxels, -1},
     };
     json_t *stages = json_object();
-    for (int i = 0; i < CLI_STAGE_COUNT; ++i) {
+    for (int i = 0; i < CLI_STAGES; ++i) {
         json_object_set_new(stages, stage_names[i], json_real(stats->seconds[i]));
     }
     json_t *root = json_pack("{s:s,s:o}", "version", vsh_version(), "stages_s", stages);
-    for (size_t i = 0; i < sizeof counts / sizeof counts[0]; ++i) {
+    for (size_t i = 0; i < CLI_COUNT(counts); ++i) {
         if (counts[i].of < 0 || counts[i].of == stats->of) {
             json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
         }
@@ -251,86 +241,91 @@ static int write_file(const cli_stats *stats, const vsh_run *run, const char *pa
                             stats->ao_spacing > 0 ? json_integer(stats->ao_spacing) : json_null());
     }
     add_errors(stats, root);
-    json_object_set_new(root, "confined", describe_confinement(run));
+    json_object_set_new(root, "confined", describe_confinement());
     json_object_set_new(root, "field_bytes_per_voxel", json_real(bytes_per_voxel(stats)));
     json_object_set_new(root, "voxel_size", json_real(stats->casters.voxel_size));
-    char *text = json_dumps(root, JSON_INDENT(2) | JSON_REAL_PRECISION(9));
-    json_decref(root);
-    const int code = cli_temporary_write(path, text);
-    free(text);
-    return code;
+    return cli_write_json(path, root);
 }
 
-cli_stats cli_stats_begin(int32_t of, int32_t threads) {
+cli_stats cli_stats_begin(int of) {
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
-    return (cli_stats){
-        .of = of, .shade = vsh_shade_stats_zero(), .threads = threads > 0 ? threads : (int32_t)cores};
+    return (cli_stats){.of = of,
+                       .lap = vshi_seconds(),
+                       .shade = vsh_shade_stats_zero(),
+                       .threads = cli_run.threads > 0 ? cli_run.threads : (int32_t)cores};
 }
 
-int cli_stats_finish(const cli_stats *stats, const vsh_run *run, const char *path) {
-    CLI_TRY(path != NULL ? write_file(stats, run, path) : CLI_OK);
+int cli_stats_finish(const cli_stats *stats, const char *path) {
+    CLI_TRY(path != NULL ? write_file(stats, path) : CLI_OK);
     cli_signals_end(CLI_OK);
     return CLI_OK;
 }
 
-/* "estimated error: shadow 0.0123 (the voxels' 0.012; worst 0.05), AO 0.0071 (worst 0.02)". */
+/* Prints "estimated error: shadow 0.0123 (the voxels' 0.012; worst 0.05), AO 0.0071 (worst 0.02)". */
 static void say_errors(const cli_stats *stats) {
-    char *text = NULL;
-    size_t size = 0;
-    FILE *out = open_memstream(&text, &size);
+    const char *text = "";
     for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
         const vsh_bake_error known = sum_errors(stats, kind);
         const double error = vsh_bake_error_rmse(&known), field = vsh_bake_error_field(&known);
-        if (isnan(error)) {
-            continue;
+        if (!isnan(error)) {
+            text = cli_keep_text(
+                "%s%s%s %.3g (%sworst %.3g)", text, *text != '\0' ? ", " : "", kinds[kind].word, error,
+                isnan(field) || stats->methods[kind].traces ? "" : cli_keep_text("the voxels' %.3g; ", field),
+                known.worst);
         }
-        fprintf(out, "%s%s %.3g (", ftell(out) > 0 ? ", " : "", kinds[kind].said, error);
-        if (!isnan(field) && !stats->methods[kind].traces) {
-            fprintf(out, "the voxels' %.3g; ", field);
-        }
-        fprintf(out, "worst %.3g)", known.worst);
     }
-    fclose(out);
-    if (size > 0) {
-        cli_say("estimated error: %s", text);
-    }
-    free(text);
-}
-
-/* "shadow exact, AO exact, max error 0.02; 11.3 rays a value". */
-static void say_choice(const cli_stats *stats) {
-    char methods[128], rays[48] = "";
-    double values = 0.0;
-    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
-        values += sum_errors(stats, kind).values;
-    }
-    if (values > 0.0) {
-        snprintf(rays, sizeof rays, "; %.3g rays a value", (double)stats->shade.rays / values);
-    }
-    if (*cli_stats_methods_text(stats, methods, sizeof methods) != '\0') {
-        cli_say("%s%s", methods, rays);
+    if (*text != '\0') {
+        cli_inform("estimated error: %s", text);
     }
 }
 
 void cli_stats_say(const cli_stats *stats) {
-    char field[32], peak[32];
-    if (stats->casters.field_bytes == 0) {
-        cli_say("no voxels, %d thread%s, peak %s", stats->threads, stats->threads == 1 ? "" : "s",
-                vshi_bytes_text(vshi_peak_bytes(), peak, sizeof peak));
-    } else {
-        cli_say("voxel %.4g, %" PRIu64
-                " active voxels, field of %d level%s in %s (%.1f bytes a voxel), %d thread%s, "
-                "peak %s",
-                stats->casters.voxel_size, stats->casters.active_voxels, stats->casters.levels,
-                stats->casters.levels == 1 ? "" : "s",
-                vshi_bytes_text(stats->casters.field_bytes, field, sizeof field), bytes_per_voxel(stats),
-                stats->threads, stats->threads == 1 ? "" : "s",
-                vshi_bytes_text(vshi_peak_bytes(), peak, sizeof peak));
+    const char *voxels = "no voxels", *methods = cli_stats_methods_text(stats);
+    const vsh_occluders_info *casters = &stats->casters;
+    double values = 0.0;
+    for (int kind = 0; kind < CLI_STATS_KINDS; ++kind) {
+        values += sum_errors(stats, kind).values;
     }
-    say_choice(stats);
+    if (casters->field_bytes > 0) {
+        voxels = cli_keep_text(
+            "voxel %.4g, %" PRIu64 " active voxels, field of %d level%s in %s (%.1f bytes a voxel)",
+            casters->voxel_size, casters->active_voxels, casters->levels, casters->levels == 1 ? "" : "s",
+            cli_bytes_text(casters->field_bytes), bytes_per_voxel(stats));
+    }
+    cli_inform("%s, %d thread%s, peak %s", voxels, stats->threads, stats->threads == 1 ? "" : "s",
+               cli_bytes_text(vshi_peak_bytes()));
+    if (*methods != '\0') {
+        cli_inform("%s%s", methods,
+                   values > 0.0 ? cli_keep_text("; %.3g rays a value", (double)stats->shade.rays / values)
+                                : "");
+    }
     say_errors(stats);
     const double *s = stats->seconds;
-    cli_say("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
-            s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake",
-            s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
+    cli_inform("load %.2f s, voxelize %.2f s, field %.2f s, %s %.2f s, write %.2f s", s[CLI_STAGE_LOAD],
+               s[CLI_STAGE_VOXELIZE], s[CLI_STAGE_FIELD], stats->of == CLI_STATS_POINTS ? "shade" : "bake",
+               s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
+}
+
+/* --- provenance */
+
+int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
+                        const vsh_occluders_info *casters, cli_provenance *origin) {
+    *origin = (cli_provenance){NULL, NULL, 0};
+    vsh_provenance_source source = vsh_provenance_source_default();
+    source.scene = scene;
+    source.command = cli_parsed.command;
+    if (casters != NULL) {
+        source.voxel_size = casters->voxel_size;
+        source.has_triangles = casters->has_triangles;
+    }
+    source.files = files;
+    source.file_count = file_count;
+    CLI_TRY(cli_check(vsh_provenance_create(&source, &cli_run, &origin->made, &cli_error)));
+    origin->attributes = vsh_provenance_attributes(origin->made, &origin->count);
+    return CLI_OK;
+}
+
+void cli_provenance_free(cli_provenance *origin) {
+    vsh_provenance_free(origin->made);
+    *origin = (cli_provenance){NULL, NULL, 0};
 }

@@ -6,6 +6,39 @@
 
 #include <stdbool.h>
 
+/* Returns limits that pass rounding (another compiler, 16-bit files), and fail penumbrae a tenth wider, a
+ * shift of a quarter of a texel, and a lost caster of four texels. */
+vsh_limits vshi_limits_default(void);
+
+/* Returns bits: bit i is set if measure i fails. A measure that does not apply passes. If no value was
+ * compared, all fail. */
+uint32_t vshi_compare_judge(const vsh_measures *measures, const vsh_limits *limits);
+
+/* Compares two planes of coverage [count]. Texels above 1/2 are covered (NULL: all are). Writes 1 into
+ * mask[count] (may be NULL) where both are covered, else 0. Cannot fail. */
+void vshi_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
+                           vsh_coverage *coverage);
+
+/* Widens limits, and sets options.noise, for bakes made by sampling: standard errors a and b make noise of
+ * √(a² + b²), in units of the range, 0 … 1. docs/pipeline.md has the formulas. Set strict limits after
+ * this call. Cannot fail. */
+void vshi_limits_allow_noise(vsh_limits *limits, double noise);
+
+/* Limits from a JSON file (docs/pipeline.md): for all channels, and for single ones. */
+typedef struct vshi_tolerances vshi_tolerances;
+
+/* Reads such a file. Free it with vshi_tolerances_free(). Errors: VSH_ERROR_ARGUMENT (path or tolerances
+ * NULL), VSH_ERROR_READ, VSH_ERROR_INPUT (no JSON, unknown keys, values out of range, with the place),
+ * VSH_ERROR_LIMIT (the parsed file may take over 64 MiB). */
+vsh_result vshi_tolerances_read(const char *path, vshi_tolerances **tolerances, vsh_error *error);
+void vshi_tolerances_free(vshi_tolerances *tolerances); /* NULL does nothing */
+
+/* Overwrites *limits with the file's limits for a channel, and *coverage (may be NULL) with the share of
+ * covered texels that may differ. Other limits stay. Does nothing if tolerances is NULL.
+ * Cannot fail. */
+void vshi_tolerances_apply(const vshi_tolerances *tolerances, const char *channel, vsh_limits *limits,
+                           double *coverage);
+
 enum { VSHI_GOLDEN, VSHI_NEW };
 
 typedef struct vshi_pair {
@@ -53,29 +86,17 @@ static inline bool vshi_find_offset(const vshi_pair *pair, const size_t place[3]
  * noise / slope, and a steady edge (penumbra.c) has at least half the mean slope there. */
 #define VSHI_NOISE_WIDTH 5.0
 
-/* Bytes of scratch for each value. */
-enum { VSHI_SHIFT_SCRATCH = 5, VSHI_REGIONS_SCRATCH = 8 };
+enum { VSHI_MOST_REACH = 16 }; /* of vsh_compare_options.reach */
 
-/* Each function fills its own members of the measures. */
+/* Fills the measures' shift. `scratch`: 5 bytes a value. */
 void vshi_measure_shift(const vshi_pair *pair, void *scratch, vsh_measures *measures);
-void vshi_measure_noise(const vshi_pair *pair, vsh_measures *measures);
 
-/* Lost and gained regions, excusing the larger of measured and allowed noise. */
-void vshi_measure_regions(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
-                          vsh_measures *measures);
-
-/* `allowed` is the noise that the limits already allow for. Errors: VSH_ERROR_MEMORY. */
+/* Fills the measures of penumbrae. `allowed` is the noise that the limits already allow for. Errors:
+ * VSH_ERROR_MEMORY. */
 vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_measures *measures,
                                   vsh_error *error);
 
-/* Fits the curve that takes golden values to new ones. If it explains the difference, replaces the pair's
- * golden plane by mapped[count] with the curve applied, fills measures->curve, and returns true. */
-bool vshi_follow_curve(vshi_pair *pair, float *mapped, vsh_measures *measures);
-
 /* Adds up golden's penumbra widths and the new values' deviation from them, for vsh_accuracy.width_error. */
 void vshi_add_widths(const vshi_pair *pair, double *golden, double *off);
-
-/* Overwrites limits, and *coverage (may be NULL), with those that are given. */
-void vshi_apply_options(const vsh_compare_files_options *given, vsh_limits *limits, double *coverage);
 
 #endif

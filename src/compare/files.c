@@ -1,9 +1,13 @@
-/* Compares two files: images channel by channel, or .vdb files grid by grid, over what both cover. */
+/* Compares two files, images channel by channel or .vdb files grid by grid, over what both cover. Limits: the
+ * table of measures, the verdict, and files of tolerances (JSON). */
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "compare/compare.h"
+#include "levelset/access.h"
+#include "scene/scene.h"
+#include "json/json.h"
 
 #include <math.h>
 #include <stdarg.h>
@@ -12,10 +16,166 @@
 #include <string.h>
 #include <strings.h>
 #include <unistd.h>
-#include <vdbshade/provenance.h>
-#include <vdbshade/voxels.h>
+#include <vdbshade/scene.h>
+#include <vdbshade/volume.h>
 
-enum { MAX_GRIDS = 4096, MOST_TEXTS = 64 };
+enum { MAX_GRIDS = 4096, MOST_TEXTS = 64, MOST_TOLERANCE_BYTES = 64 << 20 };
+
+/* --- limits */
+
+static const double MOST = 1e15; /* this limit, and larger ones, switch a measure off */
+
+vsh_limits vshi_limits_default(void) {
+    return (vsh_limits){.struct_size = sizeof(vsh_limits),
+                        .options = vsh_compare_options_default(),
+                        .value = {[VSH_MEASURE_SHIFT] = 0.1,
+                                  [VSH_MEASURE_PENUMBRA] = 0.03,
+                                  [VSH_MEASURE_LOST] = 3.0,
+                                  [VSH_MEASURE_GAINED] = 3.0,
+                                  [VSH_MEASURE_RMSE] = 0.004,
+                                  [VSH_MEASURE_P99] = 0.02,
+                                  [VSH_MEASURE_MAX] = 0.25}};
+}
+
+/* The noise is independent of the differences that the limits pass, so squares of errors add. The largest of
+ * a million normal values is 5 standard errors away. The mean of the 16 edges or more that a penumbra needs
+ * moves by a quarter of one edge's change. */
+void vshi_limits_allow_noise(vsh_limits *limits, double noise) {
+    VSHI_FLOATS;
+    double *limit = limits->value;
+    limits->options.noise = noise;
+    limit[VSH_MEASURE_RMSE] = sqrt(limit[VSH_MEASURE_RMSE] * limit[VSH_MEASURE_RMSE] + noise * noise);
+    limit[VSH_MEASURE_MAX] += 5.0 * noise;
+    limit[VSH_MEASURE_P99] += VSHI_NOISE_P99 * noise;
+    limit[VSH_MEASURE_PENUMBRA] += 0.25 * VSHI_NOISE_WIDTH * noise;
+}
+
+uint32_t vshi_compare_judge(const vsh_measures *measures, const vsh_limits *limits) {
+    VSHI_FLOATS;
+    if (measures->count == 0) {
+        return (UINT32_C(1) << VSH_MEASURE_COUNT) - 1;
+    }
+    uint32_t failed = measures->nonfinite[0] + measures->nonfinite[1] > 0 ? 1 << VSH_MEASURE_NONFINITE : 0;
+    for (int i = VSH_MEASURE_NONFINITE + 1; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(measures->value[i]) && !(measures->value[i] <= limits->value[i])) {
+            failed |= UINT32_C(1) << i;
+        }
+    }
+    return failed;
+}
+
+/* --- files of limits */
+
+/* Limits of all channels, or of those that match. */
+typedef struct entry {
+    vsh_compare_files_options given;
+    const char *channel; /* a name, or a prefix and '*' */
+} entry;
+
+struct vshi_tolerances {
+    entry all;
+    entry *channels; /* in the file's order */
+    size_t channel_count;
+};
+
+enum { OF_CHANNEL = 1, OF_FILE = 2 };
+
+static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member);
+
+#define AT(member) .offset = offsetof(entry, given.member)
+#define LIMIT(key, measure)                                                                                  \
+    { .name = key, .kind = VSHI_NUMBER, AT(limits[measure]), .highest = 1e15 }
+
+static const vshi_key keys[] = {
+    LIMIT("shift", VSH_MEASURE_SHIFT),
+    LIMIT("penumbra", VSH_MEASURE_PENUMBRA),
+    LIMIT("lost", VSH_MEASURE_LOST),
+    LIMIT("gained", VSH_MEASURE_GAINED),
+    LIMIT("rmse", VSH_MEASURE_RMSE),
+    LIMIT("p99", VSH_MEASURE_P99),
+    LIMIT("max", VSH_MEASURE_MAX),
+    {.name = "step", .kind = VSHI_NUMBER, AT(step), .highest = 1.0, .flags = VSHI_ABOVE},
+    {.name = "reach", .kind = VSHI_INTEGER, AT(reach), .highest = VSHI_MOST_REACH},
+    {.name = "coverage", .kind = VSHI_NUMBER, .variants = OF_FILE, AT(coverage_limit), .highest = 1.0},
+    {.name = "channels", .kind = VSHI_CUSTOM, .variants = OF_FILE, .read = read_channels},
+};
+static const vshi_table key_table = VSHI_TABLE(keys);
+_Static_assert(offsetof(vshi_tolerances, all) == 0, "offsets of keys are those in an entry");
+
+static vsh_result read_channels(vshi_json *reader, const vshi_value *value, void *member) {
+    vshi_tolerances *made = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&made->channels, json_object_size(value->json),
+                                sizeof(entry), "channels"));
+    vshi_value item = {.json = NULL};
+    while (vshi_next_member(value, &item)) {
+        entry *e = &made->channels[made->channel_count];
+        const char *name;
+        VSHI_TRY(vshi_json_copy(reader, 0, item.key, &name));
+        *e = (entry){vsh_compare_files_options_default(), name};
+        VSHI_TRY(vshi_read_object(reader, &item, &key_table, OF_CHANNEL, "a channel's tolerances", e));
+        ++made->channel_count;
+    }
+    return VSH_OK;
+}
+
+static vsh_result read_tolerances(vshi_json *reader, const vshi_value *root, void *made) {
+    ((vshi_tolerances *)made)->all.given = vsh_compare_files_options_default();
+    return vshi_read_object(reader, root, &key_table, OF_FILE, "tolerances", made);
+}
+
+vsh_result vshi_tolerances_read(const char *path, vshi_tolerances **tolerances, vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(tolerances);
+    *tolerances = NULL;
+    VSHI_NEEDS(path);
+    vsh_run run = vsh_run_default();
+    run.memory_limit = MOST_TOLERANCE_BYTES;
+    vshi_json reader = {.path = path, .run = &run, .error = error};
+    void *made;
+    VSHI_TRY(vshi_json_read(&reader, sizeof **tolerances, read_tolerances, &made));
+    *tolerances = made;
+    return VSH_OK;
+}
+
+void vshi_tolerances_free(vshi_tolerances *tolerances) {
+    vshi_json_free(tolerances);
+}
+
+/* Overwrites limits, and *coverage (may be NULL), with the given ones. */
+static void apply_options(const vsh_compare_files_options *given, vsh_limits *limits, double *coverage) {
+    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
+        if (!isnan(given->limits[i])) {
+            limits->value[i] = given->limits[i] < MOST ? given->limits[i] : INFINITY;
+        }
+    }
+    limits->options.step = isnan(given->step) ? limits->options.step : given->step;
+    limits->options.reach = given->reach < 0 ? limits->options.reach : given->reach;
+    if (coverage != NULL && !isnan(given->coverage_limit)) {
+        *coverage = given->coverage_limit;
+    }
+}
+
+static bool is_for(const entry *e, const char *channel) {
+    const size_t length = strlen(e->channel);
+    return length > 0 && e->channel[length - 1] == '*' ? strncmp(e->channel, channel, length - 1) == 0
+                                                       : strcmp(e->channel, channel) == 0;
+}
+
+void vshi_tolerances_apply(const vshi_tolerances *tolerances, const char *channel, vsh_limits *limits,
+                           double *coverage) {
+    if (tolerances == NULL) {
+        return;
+    }
+    apply_options(&tolerances->all.given, limits, coverage);
+    for (size_t i = 0; i < tolerances->channel_count; ++i) {
+        if (is_for(&tolerances->channels[i], channel)) {
+            apply_options(&tolerances->channels[i].given, limits, NULL);
+        }
+    }
+}
+
+/* --- two files */
 
 static const double COVERAGE_LIMIT = 0.001;
 static const double SAME_PLACE = 1e-3; /* voxels that two lattices may be apart */
@@ -32,7 +192,7 @@ typedef struct files {
     const char *path[2]; /* golden, new */
     vsh_compare_files_options options;
     vsh_run run;
-    vsh_tolerances *tolerances; /* may be NULL */
+    vshi_tolerances *tolerances; /* may be NULL */
     vsh_comparison *comparison;
 } files;
 
@@ -57,7 +217,7 @@ add_problem(const files *f, vsh_error *error, const char *format, ...) {
 /* --- one channel */
 
 /* Finds the attribute with a channel's method, error, sampler and frame. */
-static const char *method_of(const attributes *texts, const char *channel) {
+static const char *find_method(const attributes *texts, const char *channel) {
     char name[VSH_CHANNEL_NAME + 16];
     snprintf(name, sizeof name, "vdbshade_%.*s", (int)strcspn(channel, "."), channel);
     for (size_t i = 0; i < texts->count; ++i) {
@@ -68,26 +228,24 @@ static const char *method_of(const attributes *texts, const char *channel) {
     return "";
 }
 
-/* Bakes made in the same way cast the same rays, so there is no noise between them. */
-static double noise_between(const attributes texts[2], const char *channel, const double max_error[2]) {
-    const bool known = !isnan(max_error[0]) && !isnan(max_error[1]);
-    const bool differ = strcmp(method_of(&texts[0], channel), method_of(&texts[1], channel)) != 0;
-    return known && differ ? sqrt(max_error[0] * max_error[0] + max_error[1] * max_error[1]) : 0.0;
-}
-
 static void set_limits(const files *f, const attributes texts[2], vsh_channel_comparison *channel) {
     const vsh_compare_files_options *o = &f->options;
-    channel->limits = vsh_limits_default();
+    channel->limits = vshi_limits_default();
     for (int which = 0; which < 2; ++which) {
         channel->max_error[which] =
-            vsh_provenance_max_error(texts[which].list, texts[which].count, channel->name);
+            vshi_provenance_max_error(texts[which].list, texts[which].count, channel->name);
     }
-    vsh_limits_allow_noise(&channel->limits, isnan(o->noise)
-                                                 ? noise_between(texts, channel->name, channel->max_error)
-                                                 : o->noise);
+    /* bakes made in the same way cast the same rays, so there is no noise between them */
+    const double *e = channel->max_error;
+    const bool noisy =
+        !isnan(e[0]) && !isnan(e[1]) &&
+        strcmp(find_method(&texts[0], channel->name), find_method(&texts[1], channel->name)) != 0;
+    vshi_limits_allow_noise(&channel->limits, !isnan(o->noise) ? o->noise
+                                              : noisy          ? sqrt(e[0] * e[0] + e[1] * e[1])
+                                                               : 0.0);
     channel->coverage_limit = COVERAGE_LIMIT;
-    vsh_tolerances_apply(f->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
-    vshi_apply_options(o, &channel->limits, &channel->coverage_limit);
+    vshi_tolerances_apply(f->tolerances, channel->name, &channel->limits, &channel->coverage_limit);
+    apply_options(o, &channel->limits, &channel->coverage_limit);
 }
 
 static vsh_result add_channel(const files *f, const char *name, const attributes texts[2],
@@ -115,7 +273,7 @@ static vsh_result measure(const files *f, vsh_channel_comparison *channel, const
                            (uint64_t)compared->size[2];
     run.memory_held -= run.memory_held < given ? run.memory_held : given;
     VSHI_TRY(vsh_compare(compared, &channel->limits.options, &run, &channel->measures, error));
-    channel->failed = vsh_compare_judge(&channel->measures, &channel->limits);
+    channel->failed = vshi_compare_judge(&channel->measures, &channel->limits);
     if (f->options.look != NULL &&
         f->options.look(f->options.user, f->comparison->channel_count - 1, channel, compared) != 0) {
         return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: comparing was stopped", f->path[1]);
@@ -184,13 +342,11 @@ static vsh_result compare_names(const files *f, const images *both, vsh_error *e
 static vsh_result compare_coverage(const files *f, images *both, vsh_error *error) {
     const int32_t width = both->image[0].width, height = both->image[0].height;
     const size_t count = (size_t)width * (size_t)height;
-    void *mask;
-    VSHI_TRY(vshi_allocate(&mask, count, 1, f->path[0], error));
-    both->mask = mask;
+    VSHI_TRY(vshi_allocate((void **)&both->mask, count, 1, f->path[0], error));
     const float *golden = find_plane(both, 0, f->options.coverage);
     const float *fresh = find_plane(both, 1, f->options.coverage);
     vsh_coverage coverage;
-    vsh_compare_coverage(count, golden, fresh, both->mask, &coverage);
+    vshi_compare_coverage(count, golden, fresh, both->mask, &coverage);
     if (f->options.padding) {
         memset(both->mask, 1, count);
     }
@@ -260,9 +416,7 @@ static vsh_vdb_entry *find_grid(const listing *list, const char *name) {
 }
 
 static vsh_result list_grids(const files *f, const char *path, listing *list, vsh_error *error) {
-    void *entries;
-    VSHI_TRY(vshi_allocate(&entries, MAX_GRIDS, sizeof *list->entries, path, error));
-    list->entries = entries;
+    VSHI_TRY(vshi_allocate((void **)&list->entries, MAX_GRIDS, sizeof *list->entries, path, error));
     VSHI_TRY(vsh_vdb_list(path, &f->run, list->entries, MAX_GRIDS, &list->count, error));
     return list->count <= MAX_GRIDS
                ? VSH_OK
@@ -276,7 +430,7 @@ static vsh_result read_lattice(const files *f, const char *path, const char *nam
     vsh_voxels *voxels = NULL;
     VSHI_TRY(vsh_voxels_from_vdb(path, name, &f->run, &voxels, error));
     for (int i = 0; i < 4; ++i) {
-        vsh_voxels_centre(voxels, (const int32_t[3]){i == 1, i == 2, i == 3}, places[i]);
+        vshi_voxels_centre(voxels, (const int32_t[3]){i == 1, i == 2, i == 3}, places[i]);
     }
     vsh_voxels_free(voxels);
     return VSH_OK;
@@ -389,12 +543,12 @@ static vsh_result compare_values(const files *f, vsh_vdb_entry *golden, vsh_vdb_
     uint8_t *mask = (uint8_t *)(active + 2 * count);
     for (int which = 0; which < 2; ++which) {
         const size_t first = which == 0 ? 0 : count;
-        VSHI_TRY(vsh_vdb_copy(f->path[which], channel->name, channel->origin, channel->size, &f->run,
-                              values + first, active + first, error));
+        VSHI_TRY(vshi_vdb_copy(f->path[which], channel->name, channel->origin, channel->size, &f->run,
+                               values + first, active + first, error));
     }
     scale_distances(golden, values, 2 * count);
     vsh_coverage coverage;
-    vsh_compare_coverage(count, active, active + count, mask, &coverage);
+    vshi_compare_coverage(count, active, active + count, mask, &coverage);
     set_coverage(channel, &coverage);
     const vsh_compared compared = {{channel->size[0], channel->size[1], channel->size[2]},
                                    values,
@@ -449,7 +603,7 @@ done:
 
 /* --- both files */
 
-static vsh_result read_tolerances(files *f, vsh_error *error) {
+static vsh_result find_tolerances(files *f, vsh_error *error) {
     char path[4096];
     const char *file = f->options.tolerances;
     if (file == NULL) {
@@ -459,7 +613,7 @@ static vsh_result read_tolerances(files *f, vsh_error *error) {
         }
         file = path;
     }
-    return vsh_tolerances_read(file, &f->tolerances, error);
+    return vshi_tolerances_read(file, &f->tolerances, error);
 }
 
 /* Maps endings of one format to one name. */
@@ -478,7 +632,7 @@ static const char *format_of(const char *path) {
 }
 
 static vsh_result compare(files *f, vsh_error *error) {
-    VSHI_TRY(read_tolerances(f, error));
+    VSHI_TRY(find_tolerances(f, error));
     const char *was = format_of(f->path[0]), *is = format_of(f->path[1]);
     if (strcasecmp(was, is) != 0) {
         VSHI_TRY(add_problem(f, error, "format: golden is '%.100s', new is '%.100s'", was, is));
@@ -506,12 +660,10 @@ vsh_result vsh_compare_files(const char *golden, const char *fresh, const vsh_co
     VSHI_NEEDS(fresh);
     files f = {.path = {golden, fresh}, .options = vsh_compare_files_options_default()};
     VSHI_TRY(vshi_run_resolve(run, &f.run, error));
-    if (options != NULL) {
-        VSHI_TRY(vshi_options_resolve(options, &f.options, sizeof f.options, "options", error));
-    }
+    VSHI_TRY(vshi_options_resolve(options, &f.options, sizeof f.options, "options", error));
     VSHI_TRY(vshi_allocate((void **)&f.comparison, 1, sizeof *f.comparison, golden, error));
     const vsh_result result = compare(&f, error);
-    vsh_tolerances_free(f.tolerances);
+    vshi_tolerances_free(f.tolerances);
     if (result != VSH_OK) {
         vsh_comparison_free(f.comparison);
         return result;

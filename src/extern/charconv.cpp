@@ -1,4 +1,4 @@
-// Numbers as text by the C++ library, which knows no locale.
+// Numbers as text by the C++ library, which ignores the locale.
 #include "base/decimal.h"
 
 #include <charconv>
@@ -9,7 +9,7 @@
 
 namespace {
 
-// Without exponent where that is not longer than what printf() would write.
+// Writes no exponent for the sizes that printf() writes without one.
 template <typename Float> char *write(char *text, Float value, Float most) {
     if (std::isnan(value)) {
         return std::char_traits<char>::copy(text, "nan", 3) + 3;
@@ -32,7 +32,7 @@ bool vshi_decimal_read(const char *text, const char *end, double *value) {
     if (behind != end || error == std::errc::invalid_argument) {
         return false;
     }
-    if (error == std::errc::result_out_of_range) { // 0 or infinite, which is not told
+    if (error == std::errc::result_out_of_range) { // 0 or infinite: from_chars() does not tell
         try {
             *value = std::strtod(std::string(text, end).c_str(), nullptr);
         } catch (const std::exception &) {

@@ -9,29 +9,38 @@
 #include <exception>
 #include <new>
 #include <stdexcept>
+#include <type_traits>
 
 namespace vshi {
 
-// Thrown inside the shims to leave with a code of our own; the error is filled already.
+// Thrown inside the shims to leave with an error of our own.
 struct Failure {
-    vsh_result code;
+    vsh_error error{};
 };
 
-// Throws what a call came to, unless that is VSH_OK.
-inline void require(vsh_result result) {
-    if (result != VSH_OK) {
-        throw Failure{result};
+// Calls a C function whose last parameter is an error, which this adds; throws that error.
+template <typename Function, typename... Arguments>
+void require(Function *function, const Arguments &...arguments) {
+    Failure failure;
+    if (function(arguments..., &failure.error) != VSH_OK) {
+        throw failure;
     }
 }
 
-// Returns the result of body(). Exceptions become VSH_ERROR_MEMORY or `code`, prefixed by `what`.
+// Returns the result of body(), or VSH_OK where it returns nothing. Exceptions become VSH_ERROR_MEMORY or
+// `code`, prefixed by `what`.
 template <typename Body>
 vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &body) noexcept {
     VSHI_FLOATS;
     try {
-        return body();
+        if constexpr (std::is_void_v<decltype(body())>) {
+            body();
+            return VSH_OK;
+        } else {
+            return body();
+        }
     } catch (const Failure &failure) {
-        return failure.code;
+        return vshi_fail(error, failure.error.code, "%s", failure.error.message);
     } catch (const std::bad_alloc &) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
     } catch (const std::exception &exception) {

@@ -1,5 +1,5 @@
-// The module of importers: what Assimp and Draco do for the library. Each file gets an importer of its own,
-// because Assimp's C API keeps the last error in one global string, shows no progress and cannot be stopped.
+// The module of importers, Assimp and Draco. Each file gets its own importer of Assimp's C++ API: the C API
+// keeps the last error in one global string, shows no progress and cannot be stopped.
 #include "extern/importers.h"
 
 #include "base/file.h"
@@ -27,8 +27,8 @@ struct Cancelled : std::runtime_error {
     Cancelled() : std::runtime_error("cancelled") {}
 };
 
-// Hands Assimp's progress to the job; leaves the reader by an exception where the job is cancelled, which
-// Assimp catches around its readers.
+// Passes Assimp's progress to the job. If the job is cancelled, throws: Assimp catches exceptions of its
+// readers.
 class Progress : public Assimp::ProgressHandler {
   public:
     Progress(vshi_job *job, size_t units) : job_(job), units_(units) {}
@@ -40,7 +40,7 @@ class Progress : public Assimp::ProgressHandler {
         const auto reached = std::max(done_, static_cast<size_t>(fraction * static_cast<double>(units_)));
         const size_t more = reached - done_;
         done_ = reached;
-        // Assimp reports the end of a stage outside of what it catches; only its readers report a middle.
+        // Assimp catches exceptions in the middle of a stage only, in its readers.
         if (vshi_job_advance(job_, more) && current > 0 && current < all) {
             throw Cancelled();
         }
@@ -52,7 +52,7 @@ class Progress : public Assimp::ProgressHandler {
     size_t done_ = 0;
 };
 
-// Opens what the file names, as a materials' file, but no pipe, and nothing outside of its folder.
+// Opens files that the model names, as its materials, but no pipe, and nothing outside of its folder.
 class Beside : public Assimp::DefaultIOSystem {
   public:
     Beside(const char *model, bool outside) : model_(model), outside_(outside) {}
@@ -81,7 +81,7 @@ class Beside : public Assimp::DefaultIOSystem {
     bool outside_;
 };
 
-// "a\nb" would break the one-line rule in a way that vshi_fail() can only patch with '?'.
+// Assimp's reasons may have several lines; messages have one.
 std::string first_line(const char *text) {
     std::string line(text);
     line.erase(std::min(line.find_first_of("\r\n"), line.size()));
@@ -115,15 +115,13 @@ vsh_result read_import(const char *path, bool outside, vshi_job *job, size_t uni
     *import = nullptr;
     return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
         auto reader = std::make_unique<Import>();
-        // Files that hold bones only would get a made-up mesh of them.
+        // Otherwise Assimp makes a mesh of bones in files without meshes.
         reader->importer.SetPropertyBool(AI_CONFIG_IMPORT_NO_SKELETON_MESHES, true);
         reader->importer.SetProgressHandler(new Progress(job, units)); // the importer deletes it
         auto *const files = new Beside(path, outside);
-        reader->importer.SetIOHandler(files); // as it does this
+        reader->importer.SetIOHandler(files); // and deletes this
         reader->scene = reader->importer.ReadFile(path, 0);
-        if (vshi_job_cancelled(job)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
+        VSHI_TRY(vshi_job_check(job, error));
         if (!files->refused().empty()) {
             return vshi_fail(
                 error, VSH_ERROR_INPUT,
@@ -215,17 +213,17 @@ template <typename T> bool elements(const vshi_draco *mesh, uint32_t id, int com
 
 bool draco_elements(const vshi_draco *mesh, uint32_t id, int type, int components, void *values) {
     switch (type) {
-    case VSHI_DRACO_BYTE:
+    case VSHI_GLTF_BYTE:
         return elements(mesh, id, components, static_cast<int8_t *>(values));
-    case VSHI_DRACO_UBYTE:
+    case VSHI_GLTF_UBYTE:
         return elements(mesh, id, components, static_cast<uint8_t *>(values));
-    case VSHI_DRACO_SHORT:
+    case VSHI_GLTF_SHORT:
         return elements(mesh, id, components, static_cast<int16_t *>(values));
-    case VSHI_DRACO_USHORT:
+    case VSHI_GLTF_USHORT:
         return elements(mesh, id, components, static_cast<uint16_t *>(values));
-    case VSHI_DRACO_UINT:
+    case VSHI_GLTF_UINT:
         return elements(mesh, id, components, static_cast<uint32_t *>(values));
-    case VSHI_DRACO_FLOAT:
+    case VSHI_GLTF_FLOAT:
         return elements(mesh, id, components, static_cast<float *>(values));
     default:
         return false;
@@ -234,12 +232,12 @@ bool draco_elements(const vshi_draco *mesh, uint32_t id, int type, int component
 
 } // namespace
 
-// Every symbol of the module but this one is hidden (module.map).
+// The module shows this symbol only (module.map).
 const vshi_importers_table vshi_importers_module = {VSHI_VERSION, read_import,   free_import,
                                                     opacity_of,   material_name, draco_decode,
                                                     draco_free,   draco_indices, draco_elements};
 
-// Of the static library and of tests; the shared library has importers.c.
+// For the static library and for tests; the shared library has importers.c.
 vsh_result vshi_importers_load(vsh_error *) {
     return VSH_OK;
 }

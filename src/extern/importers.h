@@ -22,28 +22,28 @@ typedef struct vshi_draco {
     size_t vertex_count, triangle_count;
 } vshi_draco;
 
-/* Types of components, by glTF's numbers. */
+/* Types of components by glTF's numbers. */
 enum {
-    VSHI_DRACO_BYTE = 5120,
-    VSHI_DRACO_UBYTE = 5121,
-    VSHI_DRACO_SHORT = 5122,
-    VSHI_DRACO_USHORT = 5123,
-    VSHI_DRACO_UINT = 5125,
-    VSHI_DRACO_FLOAT = 5126
+    VSHI_GLTF_BYTE = 5120,
+    VSHI_GLTF_UBYTE = 5121,
+    VSHI_GLTF_SHORT = 5122,
+    VSHI_GLTF_USHORT = 5123,
+    VSHI_GLTF_UINT = 5125,
+    VSHI_GLTF_FLOAT = 5126
 };
 
 typedef struct vshi_importers_table {
-    const char *version; /* of the header that it was built with */
+    const char *version; /* of the headers that the module was built with */
 
-    /* Reads the file as it is: polygons stay polygons, nothing is joined, generated or transformed. Opens
-     * only regular files that the file names, in its folder or `outside`: else VSH_ERROR_INPUT. Advances the
-     * job by up to `units`. Errors: VSH_ERROR_READ with Assimp's reason, VSH_ERROR_MEMORY,
-     * VSH_ERROR_CANCELLED (the readers of OBJ and a few others listen). */
+    /* Reads the file without changes: polygons stay polygons, nothing is joined, generated or transformed.
+     * Opens only regular files that the file names, in its folder or `outside`. Advances the job by up to
+     * `units`. Errors: VSH_ERROR_INPUT (a file outside), VSH_ERROR_READ with Assimp's reason,
+     * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (a few readers only). */
     vsh_result (*read)(const char *path, bool outside, vshi_job *job, size_t units, vshi_import **import,
                        vsh_error *error);
     void (*free)(vshi_import *import);
 
-    /* Get a material's opacity, 1 if the file gives none, and its name; false: the file gives none. */
+    /* Get a material's opacity, by default 1, and its name; false if it has no name. */
     float (*opacity)(const struct aiScene *scene, unsigned material);
     bool (*material_name)(const struct aiScene *scene, unsigned material, struct aiString *name);
 
@@ -54,15 +54,15 @@ typedef struct vshi_importers_table {
 
     void (*draco_indices)(const vshi_draco *mesh, uint32_t *indices); /* [triangle_count][3] */
 
-    /* [vertex_count][components] of the attribute `id` as numbers of a VSHI_DRACO_… type; false where there
-     * is no such attribute, or it has another number of components. */
+    /* Writes attribute `id` as [vertex_count][components] numbers of a type VSHI_GLTF_…. Returns false if
+     * there is no such attribute, or it has another number of components. */
     bool (*draco_elements)(const vshi_draco *mesh, uint32_t id, int type, int components, void *values);
 } vshi_importers_table;
 
 /* The module's one symbol. */
 VSHI_SHARED extern const vshi_importers_table vshi_importers_module;
 
-/* Loads the module. Errors: as of vshi_module_load(). */
+/* Loads the module. Errors: as vshi_module_load(). */
 vsh_result vshi_importers_load(vsh_error *error);
 
 /* NULL before vshi_importers_load(). */

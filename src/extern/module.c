@@ -12,13 +12,13 @@
 #include <string.h>
 #include <sys/mman.h>
 
-/* The module in a folder, from that of this library; NULL: it is not there. */
+/* Opens the module in a folder below this library's; NULL: it is not there. */
 static void *open_beside(const char *folder, const char *file) {
     static const char of_this_library = 0;
     Dl_info here;
     char path[4096];
     const bool known = dladdr(&of_this_library, &here) != 0 && here.dli_fname != NULL;
-    /* a path that is not absolute would be looked for where the host is by now */
+    /* the host may have left the folder that a relative path begins at */
     const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
     if (end == NULL || (size_t)snprintf(path, sizeof path, "%.*s/%s%s", (int)(end - here.dli_fname),
                                         here.dli_fname, folder, file) >= sizeof path) {
@@ -27,9 +27,8 @@ static void *open_beside(const char *folder, const char *file) {
     return dlopen(path, RTLD_LAZY | RTLD_LOCAL);
 }
 
-/* Beside this library as it is built, in a folder of its own there as it is installed, and then as every
- * library is searched for: in a host with a sanitizer, whose dlopen() is not libc's, the search does not
- * begin at this one. */
+/* Searches beside this library (as built), in its folder vdbshade (as installed), then on the loader's path.
+ * In a host with a sanitizer, which replaces dlopen(), the loader does not search beside this library. */
 static void *open_module(const char *file) {
     void *module = open_beside("", file);
     module = module != NULL ? module : open_beside("vdbshade/", file);
@@ -44,15 +43,15 @@ static bool has_room(size_t bytes) {
     return room != MAP_FAILED;
 }
 
-/* What throws while libraries are loaded (their statics, refused memory or a thread) is caught by nobody and
- * ends the process: what they take is asked for before. */
+/* Exceptions while libraries load (their statics, refused memory or threads) end the process, so this checks
+ * their needs before. */
 static vsh_result check_room(const vshi_module *module, vsh_error *error) {
     errno = 0;
     if (module->threads > 0 && !vshi_threads_left(module->threads)) {
-        if (errno == ENOMEM) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", module->what);
-        }
-        return vshi_fail(error, VSH_ERROR_MEMORY,
+        return errno == ENOMEM
+                   ? vshi_fail_memory(error, module->what)
+                   : vshi_fail(
+                         error, VSH_ERROR_MEMORY,
                          "threads: the system refuses the %d that OpenVDB's libraries begin; %s need it",
                          module->threads, module->what);
     }
@@ -63,10 +62,7 @@ static vsh_result check_room(const vshi_module *module, vsh_error *error) {
 }
 
 static vsh_result load(vshi_module *module, vsh_error *error) {
-    const vsh_result result = check_room(module, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(check_room(module, error));
     errno = 0;
     void *opened = open_module(module->file);
     if (opened == NULL && errno == ENOMEM) {
@@ -76,7 +72,7 @@ static vsh_result load(vshi_module *module, vsh_error *error) {
     const void *table = opened != NULL ? dlsym(opened, module->symbol) : NULL;
     if (table == NULL) {
         const char *why = dlerror();
-        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need a module that cannot be had: %s",
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need a module that cannot be loaded: %s",
                          module->what, why != NULL ? why : module->file);
     }
     const char *version = *(const char *const *)table;

@@ -1,9 +1,10 @@
-// Loops over TBB's pool.
+// Loops over TBB's pool, and refused memory in a reader.
+#include "extern/tbb.h"
 #include "base/parallel.h"
 #include "base/threads.h"
-#include "extern/arenas.h"
 #include "extern/guard.h"
-#include "extern/tsan.h"
+#include "sandbox/confine.h"
+#include "sandbox/reader.h"
 
 #include <algorithm>
 #include <optional>
@@ -11,6 +12,7 @@
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <unistd.h>
 
 namespace {
 
@@ -23,19 +25,19 @@ struct Loop {
     void *user;
 
     void operator()(size_t index) const {
-        vshi::take(this); // before anything of this loop is read
+        vshi::acquire(this); // before this loop reads anything
         if (!vshi_job_cancelled(job)) {
             const size_t begin = index * grain;
             const size_t end = std::min(count, begin + grain);
             fn(user, begin, end);
             vshi_job_advance(job, units * (end - begin));
         }
-        vshi::give(this);
+        vshi::release(this);
     }
 };
 
-// More threads than cores are allowed for as long as one of these lasts, and no more than the host allows:
-// TBB would complain on standard error.
+// An arena for one loop. Allows more threads than cores while it exists, but no more than the host allows:
+// otherwise TBB complains on standard error.
 class Arena {
   public:
     explicit Arena(int threads) {
@@ -54,7 +56,7 @@ class Arena {
     std::optional<vshi::LentArena> arena;
 };
 
-// What throws here is TBB, to which the system refused a thread: loops throw nothing.
+// Only TBB throws here, if the system refuses a thread: loops throw nothing.
 template <typename Body> vsh_result with_threads(vsh_error *error, Body &&body) {
     return vshi::guard(error, VSH_ERROR_INTERNAL, "threads", [&]() -> vsh_result {
         try {
@@ -80,8 +82,8 @@ int32_t vshi_parallel_threads(int32_t wanted) {
     if (given == all) {
         return wanted;
     }
-    // Of arenas that are not ours too (OpenVDB frees its trees in TBB's own), and for as long as the process
-    // lives: TBB would end it.
+    // TBB would end the process. The limit also holds for arenas of others, because OpenVDB frees its trees
+    // in TBB's own, and for the whole life of the process.
     static const auto *const limit =
         new control(control::max_allowed_parallelism, static_cast<size_t>(given));
     (void)limit;
@@ -104,11 +106,11 @@ vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t u
             }
         } else {
             Arena arena(threads);
-            vshi::give(&loop);
+            vshi::release(&loop);
             arena.run([&] { tbb::parallel_for(size_t{0}, pieces, loop); });
-            vshi::take(&loop);
+            vshi::acquire(&loop);
         }
-        return vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+        return vshi_job_check(job, error);
     });
 }
 
@@ -117,4 +119,8 @@ vsh_result vshi_parallel_call(const vshi_job *job, void (*fn)(void *user), void 
         Arena(vshi_job_threads(job)).run([&] { fn(user); });
         return VSH_OK;
     });
+}
+
+void vshi_confine_memory(void) {
+    std::set_new_handler([] { _exit(VSHI_READER_OUT_OF_MEMORY); });
 }

@@ -1,8 +1,9 @@
-#include "field/field.h"
+#include "field/level.h"
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "field/surface.h"
+#include "mesh/mesh.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -11,14 +12,14 @@
 /* Voxel of a field of one value, finest voxels. */
 #define CONSTANT_SCALE 0x1p60f
 
-/* Without a wish for a reach: what a light of 60° can use at receivers several diagonals away. */
-static const double DEFAULT_REACH = 4.0; /* diagonals of the bounds */
+/* Default reach, diagonals of the bounds: enough for a light of 60° at receivers several diagonals away. */
+static const double DEFAULT_REACH = 4.0;
 
-void vsh_field_free(vsh_field *field) {
+void vshi_field_free(vsh_field *field) {
     if (field == NULL) {
         return;
     }
-    vsh_triangles_free(field->surface);
+    vshi_triangles_free(field->surface);
     free(field->values);
     free(field->index);
     free(field);
@@ -67,29 +68,16 @@ static bool find_bounds(vsh_field *field, const vshi_below *finest) {
     return low[0] <= high[0];
 }
 
-/* The finest level, of the grid's own voxels. */
-static vsh_result read_finest(const vsh_grid *grid, const vsh_grid_info *info, vsh_field *f,
-                              const vsh_run *run, vshi_job *job, vshi_below *below, vsh_error *error) {
-    const float band = (float)fmin(info->half_width, VSHI_COARSE_BAND);
-    vshi_budget budget = {run, (double)info->bytes};
-    vshi_blocks blocks = {.map = NULL};
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_level_blocks_read(grid, band, budget, job, &blocks, error));
-    budget.held += (double)blocks.count * 512.0 * sizeof *blocks.values;
-    result = vshi_level_append(f, &blocks, budget, job, below, error);
-done:
-    vshi_level_blocks_free(&blocks);
-    return result;
-}
-
-/* Coarser levels, up to one that reaches so many finest voxels. `held`: bytes beside the field. */
+/* Derives coarser levels, up to one that reaches so many finest voxels. `held`: bytes in use beside the
+ * field. */
 static vsh_result derive_levels(vsh_field *f, double reach, double held, const vsh_run *run, vshi_job *job,
                                 vshi_below *below, vsh_error *error) {
     for (size_t units = 30; f->level_count < VSHI_MAX_LEVELS; units /= 2) {
         if (f->levels[f->level_count - 1].band >= reach) {
             break;
         }
-        VSHI_TRY(vshi_level_derive(f, below, (vshi_budget){run, held + vshi_field_bytes(f)}, job, error));
+        VSHI_TRY(
+            vshi_level_derive(f, below, (vshi_field_budget){run, held + vshi_field_bytes(f)}, job, error));
         if (vshi_job_advance(job, units)) {
             return vshi_job_fail_cancelled(job, error);
         }
@@ -97,17 +85,17 @@ static vsh_result derive_levels(vsh_field *f, double reach, double held, const v
     return VSH_OK;
 }
 
-vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *options, const vsh_run *run,
-                            vsh_field **field, vsh_error *error) {
+vsh_result vshi_field_create(const vsh_grid *grid, const vshi_field_options *options, const vsh_run *run,
+                             vsh_field **field, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(field);
     *field = NULL;
     VSHI_NEEDS(grid);
-    vsh_field_options o = vsh_field_options_default();
+    vshi_field_options o = vshi_field_options_default();
     vsh_run r;
     vshi_below below = {.bricks = NULL};
     vsh_field *f = NULL;
-    VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_field_options", error));
+    o = options != NULL ? *options : o;
     VSHI_TRY(vshi_run_resolve(run, &r, error));
     if (!(o.reach >= 0.0 && !isinf(o.reach))) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "reach %g: expected a length, 0 or more", o.reach);
@@ -118,7 +106,7 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
 
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
-    /* levels are progress: each has a quarter of the work of the one below */
+    /* each level has a quarter of the work of the one below */
     vshi_job *job = vshi_job_begin(&r, "field", 100);
     if (job == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
@@ -133,7 +121,9 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     memcpy(f->world_max, info.bounds_max, sizeof f->world_max);
     invert(info.transform, info.voxel_size, f->to_field);
 
-    VSHI_TRY_DONE(read_finest(grid, &info, f, &r, job, &below, error));
+    const float band = (float)fmin(info.half_width, VSHI_COARSE_BAND);
+    VSHI_TRY_DONE(
+        vshi_level_read(f, grid, band, (vshi_field_budget){&r, (double)info.bytes}, job, &below, error));
     if (!find_bounds(f, &below)) {
         result = vshi_fail(error, VSH_ERROR_INPUT, "field: the level set has no surface");
         goto done;
@@ -141,20 +131,20 @@ vsh_result vsh_field_create(const vsh_grid *grid, const vsh_field_options *optio
     vshi_job_advance(job, 40);
     VSHI_TRY_DONE(derive_levels(f, find_reach(f, o.reach), (double)info.bytes, &r, job, &below, error));
     if (o.surface != 0) {
-        const vshi_budget budget = {&r, (double)info.bytes + vshi_field_bytes(f)};
+        const vshi_field_budget budget = {&r, (double)info.bytes + vshi_field_bytes(f)};
         VSHI_TRY_DONE(vshi_field_add_surface(f, budget, job, error));
     }
     *field = f;
     f = NULL;
 done:
     vshi_below_free(&below);
-    vsh_field_free(f);
+    vshi_field_free(f);
     vshi_job_end(job);
     return result;
 }
 
-/* A field of one level, whose voxels are wider than any scene: 2³ blocks around the origin, all of one brick
- * whose values are the band or 0. */
+/* Makes a field of one level, with voxels wider than any scene: 2³ blocks around the origin share one brick,
+ * whose values are the band (`free`) or 0. */
 static vsh_result create_constant(double voxel_size, float band, bool free, vsh_field **field,
                                   vsh_error *error) {
     enum { BLOCKS = 8 };
@@ -188,7 +178,7 @@ static vsh_result create_constant(double voxel_size, float band, bool free, vsh_
     *field = f;
     f = NULL;
 done:
-    vsh_field_free(f);
+    vshi_field_free(f);
     return result;
 }
 
@@ -208,7 +198,7 @@ vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], con
     vsh_field *f = *field;
     f->unknown = true;
     for (int axis = 0; axis < 3; ++axis) {
-        /* around 0, for positions become floats, as a level set of the same casters is */
+        /* around 0, as positions become floats, like a level set of the same casters */
         const double middle = round((low[axis] + 0.5 * (high[axis] - low[axis])) / voxel_size);
         f->to_field[4 * axis + 3] = -middle;
         f->world_min[axis] = low[axis];
@@ -219,8 +209,8 @@ vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], con
     return VSH_OK;
 }
 
-/* Gradients are taken from a level whose band is wider than the distance by this much, its voxels: values
- * beyond the band are clamped, and clamped corners turn the gradient. */
+/* Gradients come from a level whose band exceeds the distance by this much, its voxels: corners clamped to
+ * the band would turn the gradient. */
 static const float GRADIENT_ROOM = 1.0f;
 
 static void level_gradient(const vsh_field *field, int32_t l, const float p[3], float gradient[3]) {
@@ -228,7 +218,7 @@ static void level_gradient(const vsh_field *field, int32_t l, const float p[3], 
         vshi_level_sample(field, 0, p, gradient);
         return;
     }
-    /* a coarse cell's own gradient shows what its corners are off by: 14° beside a sphere, 2° with this */
+    /* a coarse cell's own gradient has the errors of its corners: 14° beside a sphere, 2° with this */
     const float step = 0.5f * field->levels[l].scale;
     for (int axis = 0; axis < 3; ++axis) {
         float low[3] = {p[0], p[1], p[2]}, high[3] = {p[0], p[1], p[2]};
@@ -291,10 +281,134 @@ void vsh_field_get_info(const vsh_field *field, vsh_field_info *info) {
         .levels = field->level_count,
         .bricks = bricks,
         .bytes = (uint64_t)vshi_field_bytes(field) +
-                 (field->surface != NULL ? vsh_triangles_bytes(field->surface) : 0),
+                 (field->surface != NULL ? vshi_triangles_bytes(field->surface) : 0),
         .active_voxels = field->active_voxels,
     };
     memcpy(found.bounds_min, field->world_min, sizeof found.bounds_min);
     memcpy(found.bounds_max, field->world_max, sizeof found.bounds_max);
     *info = found;
+}
+
+/* --- lost casters: parts thinner than voxels, with no voxel's centre inside. The field is negative within a
+ * voxel of a surface that it holds, along the normal. So it is sampled there, at places all over a mesh, each
+ * for the same area. A slab that is 1.25 voxels thick has a voxel's centre an eighth of a voxel under its
+ * surface, wherever it lies. */
+
+/* Sampled places of all meshes together, and least number of each mesh; samples to each side of a place. */
+enum { PLACES = 16384, LEAST = 64, STEPS = 5 };
+/* Greatest distance of a sample from the surface, voxels. Both sides are sampled, as faces may be flipped. */
+static const double DEPTH = 1.25;
+/* Distance from the surface at which rays to the other side begin, share of DEPTH. */
+static const double NEAR = 1e-4;
+static const double GOLDEN = 0.61803398874989485, SILVER = 0.41421356237309515;
+
+/* Sum of the triangles' areas. */
+static double mesh_area(const vsh_mesh *mesh) {
+    double area = 0.0;
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        vshi_vec corner[3];
+        vshi_mesh_triangle(mesh, i, corner);
+        area += vshi_mesh_degenerate(mesh, i) ? 0.0 : vshi_triangle_area(corner);
+    }
+    return area;
+}
+
+static double fraction(double x) {
+    return x - floor(x);
+}
+
+static bool holds(const vsh_field *field, vshi_vec place, vshi_vec normal) {
+    for (int step = -STEPS; step <= STEPS; ++step) {
+        const double height = DEPTH * field->voxel_size * step / STEPS;
+        const vshi_vec world = vshi_add(place, vshi_scale(normal, height));
+        const vshi_vec p = vshi_to_field(field, (const double[]){world.x, world.y, world.z});
+        if (vshi_field_distance(field, (const float[]){(float)p.x, (float)p.y, (float)p.z}) <= 0.0f) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Thickness of a solid under a place, world units: infinite for a sheet, which has no other side. Negative if
+ * it is too thick for voxels to lose: then they only cut an edge. */
+static double find_thickness(const vsh_field *field, const vshi_triangles *triangles, vshi_vec place,
+                             vshi_vec normal) {
+    const double thin = DEPTH * field->voxel_size;
+    double nearest = INFINITY;
+    for (int side = -1; side <= 1; side += 2) {
+        const vshi_vec d = vshi_scale(normal, side), from = vshi_add(place, vshi_scale(d, NEAR * thin));
+        const vshi_segment_ray ray = {{from.x, from.y, from.z}, {d.x, d.y, d.z}, INFINITY};
+        nearest = fmin(nearest, vshi_triangles_distance(triangles, &ray));
+    }
+    return nearest <= thin || isinf(nearest) ? nearest : -1.0;
+}
+
+static int by_value(const void *a, const void *b) {
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+/* Samples `places` places of a mesh; `thickness` has room for as many. */
+static void sample_mesh(const vsh_field *field, const vsh_mesh *mesh, double area, size_t places,
+                        const vshi_triangles *triangles, double *thickness, vshi_lost *lost) {
+    if (mesh->mask != NULL) { /* a sheet: voxels hold it as a shell */
+        return;
+    }
+    double before = 0.0;
+    size_t next = 0, gone = 0, measured = 0;
+    for (size_t i = 0; i < mesh->triangle_count && next < places; ++i) {
+        vshi_vec corner[3];
+        if (vshi_mesh_degenerate(mesh, i)) {
+            continue;
+        }
+        vshi_mesh_triangle(mesh, i, corner);
+        before += vshi_triangle_area(corner);
+        const vshi_vec normal = vshi_unit(vshi_triangle_normal(corner));
+        bool any = false;
+        for (; next < places && ((double)next + 0.5) / (double)places * area <= before; ++next) {
+            const vshi_vec at =
+                vshi_triangle_point(corner, fraction((double)next * GOLDEN), fraction((double)next * SILVER));
+            if (holds(field, at, normal)) {
+                continue;
+            }
+            const double thick = triangles != NULL ? find_thickness(field, triangles, at, normal) : INFINITY;
+            if (thick < 0.0) {
+                continue;
+            }
+            any = true;
+            ++gone;
+            if (isfinite(thick)) {
+                thickness[measured++] = thick;
+            }
+        }
+        lost->triangles += any;
+    }
+    lost->share = (double)gone / (double)places;
+    qsort(thickness, measured, sizeof *thickness, by_value);
+    lost->thickness = measured > 0 ? thickness[measured / 10] : 0.0;
+}
+
+vsh_result vshi_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
+                                const vshi_triangles *triangles, vshi_lost *lost, vsh_error *error) {
+    VSHI_NEEDS(field);
+    VSHI_NEEDS_OF(mesh_count, meshes);
+    VSHI_NEEDS_OF(mesh_count, lost);
+    double sum = 0.0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        VSHI_TRY(vshi_mesh_check_data(&meshes[m], m, error));
+        sum += mesh_area(&meshes[m]);
+    }
+    void *thickness = NULL;
+    VSHI_TRY(vshi_allocate(&thickness, PLACES + LEAST, sizeof(double), "lost casters", error));
+    for (size_t m = 0; m < mesh_count; ++m) {
+        const double area = mesh_area(&meshes[m]);
+        const size_t places = LEAST + (size_t)(sum > 0.0 ? PLACES * (area / sum) : 0.0);
+        vshi_lost found = {0.0, 0.0, 0};
+        if (area > 0.0) {
+            sample_mesh(field, &meshes[m], area, places, triangles, thickness, &found);
+        }
+        lost[m] = found;
+    }
+    free(thickness);
+    return VSH_OK;
 }

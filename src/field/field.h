@@ -1,20 +1,66 @@
 /* The pyramid: levels of voxels 1, 2, 4 … finest voxels wide, each a narrow band in flat bricks.
  *
  * Field space is the finest level's index space: lengths are finest voxels, lattice point (i, j, k) of level
- * l lies at 2^l (i, j, k). A brick holds 8³ cells of a level as 9³ values (one plane of apron on the far
- * sides), z fastest, so that a trilinear sample is one look-up of the brick and four loads of two neighbours
- * each. Blocks away from the surface share one of two constant bricks, so the look-up never branches.
+ * l lies at 2^l (i, j, k). A brick holds 8³ cells of a level as 9³ values (with one more plane on the far
+ * sides), z fastest. So a trilinear sample is one look-up of the brick and four loads of two neighbours each.
+ * Blocks away from the surface share one of two constant bricks, so the look-up never branches.
  *
- * Values are 16-bit multiples of a level's quantum, a power of two: for a band of 3 voxels 2^-13 voxel, of 6
- * 2^-12. Rounding is then all that is lost, and a cell interpolates to the same bits as its floats would. */
+ * Values are 16-bit multiples of a level's quantum, a power of two: 2^-13 voxel for a band of 3 voxels, 2^-12
+ * for 6. Only rounding is lost, and a cell interpolates to the same bits as its floats would. */
 #ifndef VSHI_FIELD_H
 #define VSHI_FIELD_H
 
+#include "base/job.h"
 #include "base/vec.h"
+#include "trace/trace.h"
 
 #include <stdbool.h>
 #include <stdint.h>
-#include <vdbshade/field.h>
+#include <vdbshade/occluders.h>
+
+typedef struct vshi_field_options {
+    double reach;    /* largest distance from a surface that the field resolves, world units, finite, > 0:
+                      * vshi_scene_reach(). 0: four times the diagonal of the solid's box */
+    int32_t surface; /* nonzero: extract the surface of the finest level, if the library has Embree. Adaptive
+                      * then traces its rays against it instead of marching. Values are as near to the
+                      * casters, not the same. Pays from about two rays an active voxel on, and costs some 30
+                      * bytes an active voxel */
+    double grown; /* voxels by which casters grow for rays, 0 … 1. A trilinear sample over a convex edge is
+                   * too large, by up to 0.44 voxels, so voxelised casters seem smaller than they are. 0: the
+                   * voxels define the caster, as those of a file do */
+} vshi_field_options;
+
+static inline vshi_field_options vshi_field_options_default(void) {
+    /* Through a roof of slats of 3.3 voxels AO's rays see 0.047 too much with 0, 0.0004 with this. */
+    vshi_field_options options = {0.0, 0, 0.15};
+    return options;
+}
+
+/* Makes the field of a grid; free it with vshi_field_free(). Time and memory follow the surface's area. Each
+ * level above the finest adds about a quarter of the one below. Errors:
+ * - VSH_ERROR_ARGUMENT: a reach that is negative or not finite, options, run;
+ * - VSH_ERROR_INPUT: a grid without a surface;
+ * - VSH_ERROR_LIMIT: run->memory_limit, for the surface too. More blocks or bricks of 8³ voxels than 32 bits
+ *   count (about 2^31 and 2.9 million);
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_field_create(const vsh_grid *grid, const vshi_field_options *options, const vsh_run *run,
+                             vsh_field **field, vsh_error *error);
+void vshi_field_free(vsh_field *field); /* NULL does nothing */
+
+/* The parts of a mesh that a field's voxels are too coarse to hold. A march does not see them. */
+typedef struct vshi_lost {
+    double share;     /* of the mesh's area, 0 … 1 */
+    double thickness; /* of at least nine tenths of them, world units: voxels of 0.8 times that hold them. 0:
+                         not known */
+    uint64_t triangles; /* with such places, among the tested ones */
+} vshi_lost;
+
+/* Tests some 16,000 places of the meshes of a field for a solid, into lost[mesh_count]. `triangles` of the
+ * same meshes measure the lost parts, and tell thin parts from the edges of thick ones, which voxels cut; may
+ * be NULL. Runs some milliseconds on the calling thread. Errors: VSH_ERROR_ARGUMENT (field, meshes or lost
+ * NULL), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY. */
+vsh_result vshi_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
+                                const vshi_triangles *triangles, vshi_lost *lost, vsh_error *error);
 
 enum {
     VSHI_MAX_LEVELS = 48,
@@ -30,14 +76,13 @@ typedef struct vshi_level {
     int32_t origin[3];    /* lattice coordinates of the first brick's first value; multiples of 8 */
     int32_t size[3];      /* bricks along each axis; z fastest */
     uint64_t first_index; /* of this level in vsh_field.index */
-    uint64_t first_value; /* of this level in vsh_field.values; its first brick is all +band, its second all
+    uint64_t first_value; /* of this level in vsh_field.values; the first brick is all +band, the second all
                            * -band */
-    uint64_t brick_count; /* with these two */
+    uint64_t brick_count; /* these two included */
     float scale;          /* 2^level: voxel size, finest voxels */
     float band;           /* finest voxels, a multiple of `quantum`; values are clamped to ± band */
     float quantum;        /* a step of the values, finest voxels */
-    float rounding;       /* how far rounding may have moved a value, here and on the levels below, finest
-                           * voxels */
+    float rounding;       /* largest rounding of a value, levels below included, finest voxels */
 } vshi_level;
 
 struct vsh_field {
@@ -55,13 +100,35 @@ struct vsh_field {
     bool unknown;           /* see vshi_field_create_unknown() */
     int32_t level_count;
     vshi_level levels[VSHI_MAX_LEVELS];
-    double grown;           /* by how much casters are grown for rays, voxels */
-    vsh_triangles *surface; /* of the finest level, as much grown, field space (surface.h): only for
-                             * vshi_triangles_blocked(). NULL: rays are marched */
+    double grown;            /* growth of casters for rays, voxels */
+    vshi_triangles *surface; /* of the finest level, grown, field space (surface.h), for
+                              * vshi_triangles_blocked() only. NULL: rays are marched */
 };
 
-/* Trilinear sample of one level at a field-space position; ± band where nothing is nearer, +band outside the
- * level's blocks. Where `gradient` is not NULL, it is the cell's own, per finest voxel. */
+/* Number of block (x, y, z) of a level. */
+static inline size_t vshi_block_index(const int32_t size[3], int32_t x, int32_t y, int32_t z) {
+    return ((size_t)x * (size_t)size[1] + (size_t)y) * (size_t)size[2] + (size_t)z;
+}
+
+/* Lattice coordinates of a block's first value. */
+static inline void vshi_block_corner(const int32_t origin[3], const int32_t size[3], size_t block,
+                                     int32_t corner[3]) {
+    const size_t plane = (size_t)size[1] * (size_t)size[2];
+    corner[0] = origin[0] + 8 * (int32_t)(block / plane);
+    corner[1] = origin[1] + 8 * (int32_t)(block % plane / (size_t)size[2]);
+    corner[2] = origin[2] + 8 * (int32_t)(block % (size_t)size[2]);
+}
+
+/* The first value of a cell in its brick; cells count from the level's origin. */
+static inline const int16_t *vshi_level_cell(const vsh_field *field, const vshi_level *level,
+                                             const int32_t cell[3]) {
+    const size_t block = vshi_block_index(level->size, cell[0] >> 3, cell[1] >> 3, cell[2] >> 3);
+    return field->values + field->index[level->first_index + block] + (cell[0] & 7) * VSHI_STRIDE_X +
+           (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
+}
+
+/* Trilinear sample of one level at a field-space position: at most ± band, and +band outside the level's
+ * blocks. `gradient`, if not NULL, is the cell's own, per finest voxel. */
 static inline float vshi_level_sample(const vsh_field *field, int32_t l, const float p[3],
                                       float gradient[3]) {
     const vshi_level *level = &field->levels[l];
@@ -79,11 +146,7 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
         cell[axis] = (int32_t)x;
         f[axis] = x - (float)cell[axis];
     }
-    const uint64_t block = ((uint64_t)(cell[0] >> 3) * (uint64_t)level->size[1] + (uint64_t)(cell[1] >> 3)) *
-                               (uint64_t)level->size[2] +
-                           (uint64_t)(cell[2] >> 3);
-    const int16_t *v = field->values + field->index[level->first_index + block] +
-                       (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
+    const int16_t *v = vshi_level_cell(field, level, cell);
     const float d00 = (float)(v[1] - v[0]), d01 = (float)(v[10] - v[9]);
     const float d10 = (float)(v[82] - v[81]), d11 = (float)(v[91] - v[90]);
     const float z00 = (float)v[0] + d00 * f[2];
@@ -103,8 +166,8 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
     return (y0 + (y1 - y0) * f[0]) * level->quantum;
 }
 
-/* A cell whose far corners are clamped to the band reads up to √3 voxels short, but only within half a voxel
- * of the band: this much of a band is left to the next level, voxels. */
+/* A cell with far corners clamped to the band reads up to √3 voxels short, but only within half a voxel of
+ * the band. So the next level covers this much of a band, voxels. */
 #define VSHI_BAND_EDGE 0.5f
 
 /* Error of a trilinear sample, voxels: the distance is 1-Lipschitz and a cell's centre is √3/2 from its
@@ -114,15 +177,15 @@ static inline float vshi_level_sample(const vsh_field *field, int32_t l, const f
  * Sinestrari, "Semiconcave functions", 2004). So Jensen's inequality bounds a trilinear sample's excess by
  * half the mean square distance to the corners, 3/8 voxel², over the least d in the cell. */
 #define VSHI_CURVATURE 0.375f
-/* How far a value of a coarse level may be above the distance at its own place, voxels of the level. Coarse
- * values are distances to surface points that were found, which are not always the nearest. The finest
- * level's are exact but for vshi_level.rounding. Values within solids may be off by twice as much: where
- * solids overlap, a finest value may be the distance to a triangle inside the union, which a coarse level
- * does not know. Checked on all voxels of the cloister at 512 voxels: 19 of 5.4 million free balls were too
- * large within solids, by up to 0.25 voxels, and none of 12.7 million outside. */
+/* Largest excess of a coarse value over the distance at its place, voxels of the level. Coarse values are
+ * distances to known surface points, which are not always the nearest. The finest values are exact, except
+ * for vshi_level.rounding. The excess may be twice as large in solids: where solids overlap, a finest value
+ * may be the distance to a triangle inside the union, which a coarse level does not know. Measured on all
+ * voxels of the cloister at 512 voxels: 19 of 5.4 million free balls were too large in solids, by up to 0.25
+ * voxels, and none of 12.7 million outside. */
 #define VSHI_NODE 0.3f
 
-/* Whether a sample of a level is beyond what that level resolves. */
+/* Whether a sample is beyond the range that its level resolves. */
 static inline bool vshi_level_saturated(const vshi_level *level, float h) {
     const float resolved = level->band - VSHI_BAND_EDGE * level->scale;
     return h >= resolved || h <= -resolved;
@@ -141,8 +204,8 @@ static inline float vshi_field_distance(const vsh_field *field, const float p[3]
     return h;
 }
 
-/* The same for callers who march by it: beyond the finest band |distance| is a lower bound. Where `gradient`
- * is not NULL, it points the way in which the distance grows; zero beyond the reach. */
+/* The same for marching: beyond the finest band |distance| is a lower bound. `gradient`, if not NULL, points
+ * to where the distance grows; zero beyond the reach. */
 float vshi_field_lower_bound(const vsh_field *field, const float p[3], float gradient[3]);
 
 /* World position to field space, in double precision. */
@@ -150,7 +213,7 @@ static inline vshi_vec vshi_to_field(const vsh_field *field, const double positi
     return vshi_transform_point(field->to_field, vshi_vec_of(position));
 }
 
-/* And back: to_field is a turn over the voxel size, so its inverse is its transpose times the square. */
+/* The inverse: to_field is a rotation over the voxel size, so this is its transpose times the square. */
 static inline vshi_vec vshi_direction_to_world(const vsh_field *field, vshi_vec d) {
     const double *m = field->to_field;
     return vshi_unit((vshi_vec){m[0] * d.x + m[4] * d.y + m[8] * d.z, m[1] * d.x + m[5] * d.y + m[9] * d.z,
@@ -165,20 +228,83 @@ static inline vshi_vec vshi_to_world(const vsh_field *field, vshi_vec p) {
                       square);
 }
 
-/* A field without casters, in which everything is free. Start offsets are measured in its voxel size, world
- * units, 1e-12 … 1e12; distances are a lower bound beyond all reach; its bounds are 0. Free it with
- * vsh_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+/* Makes a field without casters, in which everything is free. Start offsets are in its voxel size, world
+ * units, 1e-12 … 1e12. Distances are a lower bound beyond all reach; its bounds are 0. Free it with
+ * vshi_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error);
 
 static inline bool vshi_field_is_empty(const vsh_field *field) {
     return field->bounds_min[0] > field->bounds_max[0];
 }
 
-/* What stands for casters that are traced only: their box, and distances of 0 everywhere, which prove neither
- * that anything is free nor that it is solid. Lengths are told in voxels of this size, world units, 1e-12 …
- * 1e12, though there are none. Free it with vsh_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY.
- */
+/* Makes a field for casters that are traced only: their box, and distances of 0 everywhere, which prove
+ * nothing. Lengths are in voxels of the given size, world units, 1e-12 … 1e12. Free it with
+ * vshi_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], const double high[3],
                                      vsh_field **field, vsh_error *error);
+
+/* --- memory */
+
+/* The memory limit, and the memory in use: the grid, the field so far, the caller's arrays. */
+typedef struct vshi_field_budget {
+    const vsh_run *run;
+    double held; /* bytes */
+} vshi_field_budget;
+
+/* Bytes of the field's bricks and indices. */
+static inline double vshi_field_bytes(const vsh_field *field) {
+    double bytes = sizeof *field + (double)field->value_count * sizeof *field->values;
+    for (int32_t l = 0; l < field->level_count; ++l) {
+        const int32_t *size = field->levels[l].size;
+        bytes += (double)size[0] * size[1] * size[2] * sizeof *field->index;
+    }
+    return bytes;
+}
+
+/* --- the surface of the finest level as quads, against which rays are traced (surface.c)
+ *
+ * Corners lie on the edges of the finest level's trilinear cells, exactly at the height. Each quad lies in
+ * one cell; a triangle is a quad whose last two corners are the same. Where the surface crosses a cell's face
+ * twice, corners are joined like the face's own hyperbola, so that neighbours agree and the surface is closed
+ * (Nielson and Hamann, "The asymptotic decider", 1991). Bricks share no corners, but corners that meet are
+ * equal to the bit. */
+
+/* Makes field->surface, the surface at field->grown, for rays; NULL if no value is so low. `budget` counts
+ * all memory except for the surface's. Errors: as vshi_surface_quads_make(); VSH_ERROR_UNSUPPORTED if Embree
+ * cannot be loaded. */
+vsh_result vshi_field_add_surface(vsh_field *field, vshi_field_budget budget, vshi_job *job,
+                                  vsh_error *error);
+
+/* The quads of the surface. Their corners may run either way. */
+typedef struct vshi_surface_quads {
+    float *corners;  /* [corner_count][3], field space */
+    uint32_t *quads; /* [quad_count][4] */
+    size_t corner_count, quad_count;
+} vshi_surface_quads;
+
+/* Makes the surface where the finest level is `height`, finest voxels, within its band. Free it with
+ * vshi_surface_quads_free(), even after an error. Errors: VSH_ERROR_LIMIT (the run's; more than 2^32
+ * corners), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_surface_quads_make(const vsh_field *field, double height, const vsh_run *run,
+                                   vshi_surface_quads *quads, vsh_error *error);
+void vshi_surface_quads_free(vshi_surface_quads *quads);
+
+/* The surface where the finest level is 0, as a mesh that faces outwards, refined where quads are off the
+ * surface. */
+typedef struct vshi_surface_mesh {
+    float *positions;  /* [vertex_count][3], field space */
+    uint32_t *indices; /* [triangle_count][3] */
+    size_t vertex_count, triangle_count;
+    double transform[12]; /* field space to world */
+} vshi_surface_mesh;
+
+/* Free it with vshi_surface_mesh_free(), even after an error. Errors: as vshi_surface_quads_make(). */
+vsh_result vshi_surface_mesh_make(const vsh_field *field, const vsh_run *run, vshi_surface_mesh *mesh,
+                                  vsh_error *error);
+void vshi_surface_mesh_free(vshi_surface_mesh *mesh);
+
+/* Whether a place of field space is certainly outside of field->surface: farther from it than a quad may
+ * deviate from its cell's values. */
+bool vshi_surface_clears(const vsh_field *field, vshi_vec place);
 
 #endif

@@ -1,4 +1,4 @@
-#include "field/surface.h"
+#include "field/field.h"
 
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -15,38 +15,38 @@ enum {
     GRAIN = 16 /* bricks */
 };
 
-/* Corner x, y, z of a cell is bit 4, 2, 1: where its value lies in the brick. */
+/* Places in the brick of a cell's corners; corner x, y, z is bit 4, 2, 1. */
 static const uint16_t corner_at[8] = {0, 1, 9, 10, 81, 82, 90, 91};
 
 /* The corners of an edge, the lower first; edges along z, y and x. */
 static const uint8_t edge_corners[CELL_EDGES][2] = {{0, 1}, {2, 3}, {4, 5}, {6, 7}, {0, 2}, {1, 3},
                                                     {4, 6}, {5, 7}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
 
-/* Corners around a face, the same way on both sides of a cell, and the edges from each to the next. */
+/* Corners around a face, in the same order on both sides of a cell, and the edges from each to the next. */
 static const uint8_t face_corners[6][4] = {{0, 1, 3, 2}, {4, 5, 7, 6}, {0, 1, 5, 4},
                                            {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 3, 7, 5}};
 static const uint8_t face_edges[6][4] = {{0, 5, 1, 4},   {2, 7, 3, 6},  {0, 9, 2, 8},
                                          {1, 11, 3, 10}, {4, 10, 6, 8}, {5, 11, 7, 9}};
 
-/* The surface where the level's trilinear cells read a height, by bricks. */
+/* The surface where the level's trilinear cells equal a height, by bricks. */
 typedef struct surface_bricks {
     const vsh_field *field;
-    int32_t height; /* half quanta, odd: no value is on it */
+    int32_t height; /* half quanta, odd: no value equals it */
     size_t brick_count;
     uint32_t *bricks;  /* [brick_count]: their blocks */
-    uint32_t *corners; /* these two: [brick_count + 1]: how many all bricks before one have */
+    uint32_t *corners; /* these two: [brick_count + 1]: counts of all bricks before each */
     uint32_t *quads;
     vshi_job *job;
 } surface_bricks;
 
-/* What a cell holds: quads by its edges. */
+/* The quads of a cell, by its edges. */
 typedef struct cell_quads {
     uint8_t count;
-    bool ambiguous; /* by signs alone: a face is crossed twice */
+    bool ambiguous; /* signs are not enough: a face is crossed twice */
     uint8_t edges[MOST_QUADS][4];
 } cell_quads;
 
-/* Of each edge: the edges that it is joined with in its two faces. */
+/* For each edge: the edges joined with it in its two faces. */
 typedef struct joined {
     uint8_t count[CELL_EDGES];
     uint8_t edges[CELL_EDGES][2];
@@ -57,7 +57,7 @@ static void join(joined *j, uint8_t a, uint8_t b) {
     j->edges[b][j->count[b]++] = a;
 }
 
-/* Joins the edges that are crossed in a face; true where it is crossed twice. */
+/* Joins the crossed edges of a face. Returns whether the face is crossed twice. */
 static bool join_face(joined *j, int face, const int32_t value[8]) {
     const uint8_t *corner = face_corners[face], *edge = face_edges[face];
     uint8_t crossed[4];
@@ -70,7 +70,7 @@ static bool join_face(joined *j, int face, const int32_t value[8]) {
     if (count == 2) {
         join(j, crossed[0], crossed[1]);
     }
-    if (count == 4) { /* corners of one sign are cut off: those whose product is the less */
+    if (count == 4) { /* cut off the corners of one sign with the smaller product */
         const bool odd =
             (int64_t)value[corner[0]] * value[corner[2]] > (int64_t)value[corner[1]] * value[corner[3]];
         join(j, edge[odd ? 0 : 3], edge[odd ? 1 : 0]);
@@ -79,7 +79,7 @@ static bool join_face(joined *j, int face, const int32_t value[8]) {
     return count == 4;
 }
 
-/* Follows the edges that are joined around, and cuts each loop into quads. */
+/* Follows the loops of joined edges, and cuts each into quads. */
 static void find_quads(const int32_t value[8], cell_quads *quads) {
     joined j = {.count = {0}};
     *quads = (cell_quads){.count = 0};
@@ -90,7 +90,7 @@ static void find_quads(const int32_t value[8], cell_quads *quads) {
         uint8_t loop[CELL_EDGES];
         int length = 0;
         uint8_t at = first;
-        while (j.count[at] > 0) { /* taken edges have none left */
+        while (j.count[at] > 0) { /* used edges have 0 */
             j.count[at] = 0;
             loop[length++] = at;
             at = j.edges[at][j.count[j.edges[at][0]] > 0 ? 0 : 1];
@@ -111,7 +111,7 @@ typedef struct extraction {
     const double *centre;
     double scale;
     float *corners;
-    uint32_t *quads; /* NULL: only to be counted */
+    uint32_t *quads; /* NULL: only count */
 } extraction;
 
 static void make_cells(extraction *e) {
@@ -124,19 +124,19 @@ static void make_cells(extraction *e) {
     }
 }
 
-/* A brick on its way. */
+/* A brick under extraction. */
 typedef struct brick {
     const extraction *extraction;
     const int16_t *values;
     float origin[3]; /* of the first value, field space */
     uint32_t corner_count, quad_count;
     uint32_t first_corner;
-    float *corners; /* NULL: only to be counted */
+    float *corners; /* NULL: only count */
     uint32_t *quads;
-    uint16_t number[BRICK_EDGES]; /* 1 + that of the corner on it; 0: none yet */
+    uint16_t number[BRICK_EDGES]; /* 1 + number of the corner on the edge; 0: none yet */
 } brick;
 
-/* Writes where the surface crosses the edge between two values. */
+/* Writes the corner at which the surface crosses the edge between two values. */
 static void write_corner(const brick *b, uint32_t corner, int at, int axis, int32_t low, int32_t high) {
     const extraction *e = b->extraction;
     double p[3] = {(double)(at / VSHI_STRIDE_X), (double)(at / VSHI_STRIDE_Y % VSHI_BRICK_EDGE),
@@ -214,10 +214,10 @@ static void extract(void *user, size_t begin, size_t end) {
     }
 }
 
-/* Blocks of the finest level that have bricks of their own. */
+/* Lists the blocks of the finest level that have their own bricks. `bricks` may be NULL. */
 static size_t list_bricks(const vsh_field *field, uint32_t *bricks) {
     const vshi_level *level = &field->levels[0];
-    const size_t blocks = (size_t)level->size[0] * (size_t)level->size[1] * (size_t)level->size[2];
+    const size_t blocks = vshi_block_index(level->size, level->size[0], 0, 0);
     const int32_t constant = (int32_t)level->first_value + VSHI_BRICK_VALUES;
     size_t count = 0;
     for (size_t block = 0; block < blocks; ++block) {
@@ -231,9 +231,9 @@ static size_t list_bricks(const vsh_field *field, uint32_t *bricks) {
     return count;
 }
 
-/* Counts corners and quads; free it with free_surface(), after an error too. `height` is within the level's
+/* Counts corners and quads. Free it with free_surface(), even after an error. `height` is within the level's
  * band. */
-static vsh_result find_surface(const vsh_field *field, double height, vshi_budget budget, vshi_job *job,
+static vsh_result find_surface(const vsh_field *field, double height, vshi_field_budget budget, vshi_job *job,
                                surface_bricks *surface, vsh_error *error) {
     *surface = (surface_bricks){.field = field, .brick_count = list_bricks(field, NULL), .job = job};
     surface->height = 2 * (int32_t)floor(height / (double)field->levels[0].quantum) + 1;
@@ -263,7 +263,7 @@ static void free_surface(surface_bricks *surface) {
     free(surface->bricks);
 }
 
-/* A vshi_quads_fn: writes them, moved and scaled, field space. */
+/* vshi_quads.write: writes the quads, moved and scaled, field space. */
 static vsh_result write_surface(void *user, const double centre[3], double scale, float *corners,
                                 uint32_t *quads, vsh_error *error) {
     surface_bricks *surface = user;
@@ -272,17 +272,18 @@ static vsh_result write_surface(void *user, const double centre[3], double scale
     return vshi_parallel_for(surface->job, surface->brick_count, GRAIN, 0, extract, &e, error);
 }
 
-vsh_result vshi_field_add_surface(vsh_field *field, vshi_budget budget, vshi_job *job, vsh_error *error) {
+vsh_result vshi_field_add_surface(vsh_field *field, vshi_field_budget budget, vshi_job *job,
+                                  vsh_error *error) {
     surface_bricks surface;
     vsh_result result = find_surface(field, field->grown, budget, job, &surface, error);
-    if (result != VSH_OK || surface.quads[surface.brick_count] == 0) { /* of parts too thin for it: none */
+    if (result != VSH_OK || surface.quads[surface.brick_count] == 0) { /* all parts are too thin */
         goto done;
     }
     vshi_quads quads = {.corner_count = surface.corners[surface.brick_count],
                         .quad_count = surface.quads[surface.brick_count],
                         .write = write_surface,
                         .user = &surface};
-    for (int axis = 0; axis < 3; ++axis) { /* a voxel around what is next to it, for any height */
+    for (int axis = 0; axis < 3; ++axis) { /* a voxel around the bounds, for any height */
         quads.low[axis] = (double)field->bounds_min[axis] - 1.0;
         quads.high[axis] = (double)field->bounds_max[axis] + 1.0;
     }
@@ -293,10 +294,10 @@ done:
     return result;
 }
 
-/* A mesh on its way, a triangle's corners after the other's. */
+/* A mesh under refinement, triangle by triangle. */
 typedef struct refinement {
     const vsh_field *field;
-    float *positions; /* NULL: triangles are only counted */
+    float *positions; /* NULL: only count */
     size_t triangle_count;
 } refinement;
 
@@ -304,8 +305,8 @@ static double sample_finest(const vsh_field *field, vshi_vec p) {
     return (double)vshi_level_sample(field, 0, (float[]){(float)p.x, (float)p.y, (float)p.z}, NULL);
 }
 
-/* The middle of an edge, moved to the surface; false where it is there already. It depends on the two ends
- * alone, so the triangles on both sides agree. */
+/* Moves the middle of an edge to the surface; false if it is there already. The result depends on the two
+ * ends alone, so the triangles on both sides agree. */
 static bool find_middle(const vsh_field *field, vshi_vec a, vshi_vec b, vshi_vec *middle) {
     enum { STEPS = 3 };
     static const double NEAR = 1.0 / 64.0, ASIDE = 0.5; /* voxels */
@@ -324,7 +325,7 @@ static bool find_middle(const vsh_field *field, vshi_vec a, vshi_vec b, vshi_vec
         }
         const double square = vshi_dot(slope, slope),
                      most = fabs(height) < ASIDE ? 1.0 : ASIDE / fabs(height);
-        if (!(square > 0.25)) { /* a ridge: there is no way down */
+        if (!(square > 0.25)) { /* a ridge without a way down */
             return step > 0;
         }
         *middle = vshi_sub(*middle, vshi_scale(slope, most * height / square));
@@ -334,7 +335,7 @@ static bool find_middle(const vsh_field *field, vshi_vec a, vshi_vec b, vshi_vec
     return true;
 }
 
-/* Adds a triangle, turned to look to where the field grows. */
+/* Adds a triangle, turned to face the growing field. */
 static void add_triangle(refinement *r, const vshi_vec corner[3]) {
     static const double ASIDE = 0.25; /* voxels */
     float *to = r->positions != NULL ? r->positions + 9 * r->triangle_count : NULL;
@@ -343,9 +344,7 @@ static void add_triangle(refinement *r, const vshi_vec corner[3]) {
         return;
     }
     const vshi_vec middle = vshi_scale(vshi_add(corner[0], vshi_add(corner[1], corner[2])), 1.0 / 3.0);
-    const vshi_vec normal =
-        vshi_unit(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
-    const vshi_vec aside = vshi_scale(normal, ASIDE);
+    const vshi_vec aside = vshi_scale(vshi_unit(vshi_triangle_normal(corner)), ASIDE);
     const bool outwards =
         sample_finest(r->field, vshi_add(middle, aside)) > sample_finest(r->field, vshi_sub(middle, aside));
     for (int k = 0; k < 3; ++k) {
@@ -356,7 +355,7 @@ static void add_triangle(refinement *r, const vshi_vec corner[3]) {
     }
 }
 
-/* Adds a triangle, cut where the middles of its edges are off the surface. */
+/* Adds a triangle, cut at the edges whose middles are off the surface. */
 static void refine(refinement *r, const vshi_vec corner[3], int depth) { /* NOLINT(misc-no-recursion) */
     enum { DEEPEST = 2 };
     vshi_vec middle[3];
@@ -377,7 +376,7 @@ static void refine(refinement *r, const vshi_vec corner[3], int depth) { /* NOLI
         refine(r, middle, depth + 1);
         return;
     }
-    while ((cut >> first & 1) == 0) { /* the last edge of those that are cut comes first */
+    while ((cut >> first & 1) == 0) { /* begin with a cut edge whose successor is the other one */
         ++first;
     }
     if ((cut >> (first + 1) % 3 & 1) == 0 && (cut >> (first + 2) % 3 & 1) != 0) {
@@ -434,7 +433,7 @@ vsh_result vshi_surface_quads_make(const vsh_field *field, double height, const 
         return vshi_fail(error, VSH_ERROR_MEMORY, "surface: the system refused memory");
     }
     vsh_result result;
-    VSHI_TRY_DONE(find_surface(field, height, (vshi_budget){run, 0.0}, job, &surface, error));
+    VSHI_TRY_DONE(find_surface(field, height, (vshi_field_budget){run, 0.0}, job, &surface, error));
     quads->corner_count = surface.corners[surface.brick_count];
     quads->quad_count = surface.quads[surface.brick_count];
     VSHI_TRY_DONE(vshi_check_limit(run, bytes_of(quads), "surface", error));
@@ -495,9 +494,9 @@ void vshi_surface_mesh_free(vshi_surface_mesh *mesh) {
     *mesh = (vshi_surface_mesh){.positions = NULL};
 }
 
-/* A quad over a cell whose values have a mixed difference of m is off by up to m / 4, that of xy at its
- * middle; all four add up at most. */
-static double bend(const int16_t *v) {
+/* Bounds a quad's deviation from its cell. A mixed difference m of the values adds up to m / 4: that of xy at
+ * the middle. */
+static double bound_bend(const int16_t *v) {
     const int xy = v[90] - v[81] - v[9] + v[0], xz = v[82] - v[81] - v[1] + v[0],
               yz = v[10] - v[9] - v[1] + v[0];
     const int xyz = v[91] - v[90] - v[82] - v[10] + v[81] + v[9] + v[1] - v[0];
@@ -516,11 +515,7 @@ bool vshi_surface_clears(const vsh_field *field, vshi_vec place) {
         }
         cell[axis] = (int32_t)x;
     }
-    const size_t block =
-        ((size_t)(cell[0] >> 3) * (size_t)level->size[1] + (size_t)(cell[1] >> 3)) * (size_t)level->size[2] +
-        (size_t)(cell[2] >> 3);
-    const int16_t *v = field->values + field->index[level->first_index + block] +
-                       (cell[0] & 7) * VSHI_STRIDE_X + (cell[1] & 7) * VSHI_STRIDE_Y + (cell[2] & 7);
+    const int16_t *v = vshi_level_cell(field, level, cell);
     const double height = (double)vshi_level_sample(field, 0, p, NULL);
-    return height - field->grown > bend(v) * (double)level->quantum;
+    return height - field->grown > bound_bend(v) * (double)level->quantum;
 }

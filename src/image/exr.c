@@ -1,7 +1,7 @@
 /* OpenEXR files, through OpenEXR's C core. */
 #include "base/file.h"
 #include "base/memory.h"
-#include "image/codec.h"
+#include "image/image.h"
 
 #include <Imath/half.h>
 #include <openexr.h>
@@ -16,12 +16,12 @@ static void keep_first(exr_result_t *status, exr_result_t next) {
 
 /* --- reading */
 
-/* The first message of OpenEXR about a failure: it is the most exact. */
+/* The first message of OpenEXR about a failure, which is the most exact one. */
 typedef struct exr_log {
     char message[400];
 } exr_log;
 
-static void note(exr_const_context_t context, exr_result_t code, const char *message) {
+static void keep_message(exr_const_context_t context, exr_result_t code, const char *message) {
     void *user = NULL;
     (void)code;
     if (context == NULL || exr_get_user_data(context, &user) != EXR_ERR_SUCCESS || user == NULL) {
@@ -38,7 +38,7 @@ typedef struct exr_reader {
     exr_context_t context;
     exr_decode_pipeline_t pipeline;
     bool pipeline_ready;
-    exr_attr_box2i_t window; /* the data window: the pixels that the file has */
+    exr_attr_box2i_t window; /* the data window: the pixels of the file */
     vsh_image_file *image;
     vshi_job *job; /* in rows */
 } exr_reader;
@@ -76,49 +76,33 @@ static exr_result_t read_chunk(exr_reader *reader, const exr_chunk_info_t *info,
     return status == EXR_ERR_SUCCESS ? exr_decoding_run(reader->context, PART, pipeline) : status;
 }
 
-static bool is_going_on(const exr_reader *reader, exr_result_t status, int64_t row) {
-    return status == EXR_ERR_SUCCESS && row < reader->image->height && !vshi_job_cancelled(reader->job);
-}
-
-static exr_result_t read_lines(exr_reader *reader) {
-    int32_t lines = 0;
-    exr_result_t status = exr_get_scanlines_per_chunk(reader->context, PART, &lines);
-    if (status == EXR_ERR_SUCCESS && lines < 1) {
-        status = EXR_ERR_FILE_BAD_HEADER;
-    }
-    for (int64_t y = 0; is_going_on(reader, status, y); y += lines) {
-        exr_chunk_info_t info;
-        status = exr_read_scanline_chunk_info(reader->context, PART, (int)(y + reader->window.min.y), &info);
-        if (status == EXR_ERR_SUCCESS) {
-            status = read_chunk(reader, &info, 0, y);
-        }
-        vshi_job_advance(reader->job, (size_t)lines);
-    }
-    return status;
-}
-
-static exr_result_t read_tiles(exr_reader *reader) {
-    int32_t width = 0;
-    int32_t height = 0;
-    exr_result_t status = exr_get_tile_sizes(reader->context, PART, 0, 0, &width, &height);
+/* Reads all chunks: tiles, or scan lines as tiles of the full width. */
+static exr_result_t read_chunks(exr_reader *reader, bool tiled) {
+    int32_t width = reader->image->width, height = 0;
+    exr_result_t status = tiled ? exr_get_tile_sizes(reader->context, PART, 0, 0, &width, &height)
+                                : exr_get_scanlines_per_chunk(reader->context, PART, &height);
     if (status == EXR_ERR_SUCCESS && (width < 1 || height < 1)) {
         status = EXR_ERR_FILE_BAD_HEADER;
     }
-    for (int64_t y = 0; is_going_on(reader, status, y); y += height) {
+    for (int64_t y = 0; status == EXR_ERR_SUCCESS && y < reader->image->height; y += height) {
         for (int64_t x = 0; status == EXR_ERR_SUCCESS && x < reader->image->width; x += width) {
             exr_chunk_info_t info;
-            status = exr_read_tile_chunk_info(reader->context, PART, (int)(x / width), (int)(y / height), 0,
-                                              0, &info);
+            status = tiled ? exr_read_tile_chunk_info(reader->context, PART, (int)(x / width),
+                                                      (int)(y / height), 0, 0, &info)
+                           : exr_read_scanline_chunk_info(reader->context, PART,
+                                                          (int)(y + reader->window.min.y), &info);
             if (status == EXR_ERR_SUCCESS) {
                 status = read_chunk(reader, &info, x, y);
             }
         }
-        vshi_job_advance(reader->job, (size_t)height);
+        if (vshi_job_advance(reader->job, (size_t)height)) {
+            break;
+        }
     }
     return status;
 }
 
-/* Makes the image from the header, once that is known to be one we read. */
+/* Checks the header, and makes the image. */
 static vsh_result read_header(exr_reader *reader, const char *path, const vsh_run *run, exr_storage_t storage,
                               const exr_attr_chlist_t *channels, vsh_error *error) {
     if (storage != EXR_STORAGE_SCANLINE && storage != EXR_STORAGE_TILED) {
@@ -143,7 +127,7 @@ static vsh_result read_header(exr_reader *reader, const char *path, const vsh_ru
     for (int32_t c = 0; c < channels->num_channels; ++c) {
         vshi_image_file_name(reader->image, c, channels->entries[c].name.str);
     }
-    return vshi_image_job(path, run, height, &reader->job, error);
+    return vshi_job_open(&reader->job, run, "load", (size_t)height, path, error);
 }
 
 /* String attributes, in the file's order. */
@@ -162,13 +146,13 @@ static exr_result_t read_attributes(exr_reader *reader) {
     return status;
 }
 
-static vsh_result code_of(exr_result_t status) {
+static vsh_result convert_status(exr_result_t status) {
     switch (status) {
     case EXR_ERR_OUT_OF_MEMORY:
         return VSH_ERROR_MEMORY;
     case EXR_ERR_FEATURE_NOT_IMPLEMENTED: /* DWA compression, in 3.1 */
         return VSH_ERROR_UNSUPPORTED;
-    default: /* not there, damaged, or no EXR file */
+    default: /* missing, damaged, or no EXR file */
         return VSH_ERROR_READ;
     }
 }
@@ -178,9 +162,9 @@ vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **
     exr_log log = {""};
     exr_reader reader = {0};
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    setup.error_handler_fn = note;
+    setup.error_handler_fn = keep_message;
     setup.user_data = &log;
-    /* a file whose table of chunks is missing is cut: guessing its chunks would hide that */
+    /* a file without its table of chunks is cut; guessing the chunks would hide that */
     setup.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
 
     vsh_result result = VSH_OK;
@@ -196,12 +180,9 @@ vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **
     VSHI_TRY_DONE(read_header(&reader, path, run, storage, channels, error));
     status = read_attributes(&reader);
     if (status == EXR_ERR_SUCCESS) {
-        status = storage == EXR_STORAGE_TILED ? read_tiles(&reader) : read_lines(&reader);
+        status = read_chunks(&reader, storage == EXR_STORAGE_TILED);
     }
-
-    if (vshi_job_cancelled(reader.job)) {
-        result = vshi_job_fail_cancelled(reader.job, error);
-    }
+    result = vshi_job_check(reader.job, error);
 
 done:
     vshi_job_end(reader.job);
@@ -212,7 +193,7 @@ done:
         exr_finish(&reader.context);
     }
     if (result == VSH_OK && status != EXR_ERR_SUCCESS) {
-        result = vshi_fail(error, code_of(status), "%s: could not be read: %s", path,
+        result = vshi_fail(error, convert_status(status), "%s: could not be read: %s", path,
                            log.message[0] != '\0' ? log.message : exr_get_default_error_message(status));
     }
     if (result != VSH_OK) {
@@ -225,16 +206,16 @@ done:
 
 /* --- writing */
 
-/* OpenEXR would print its messages; ours come from the sink and from its codes. It may hold its lock on the
- * context here, so nothing here may call OpenEXR. */
-static void say_nothing(exr_const_context_t context, exr_result_t code, const char *message) {
+/* Keeps OpenEXR from printing: our messages come from the sink and from result codes. OpenEXR may hold the
+ * context's lock here, so this must not call it. */
+static void ignore_message(exr_const_context_t context, exr_result_t code, const char *message) {
     (void)context;
     (void)code;
     (void)message;
 }
 
-/* After a failed write OpenEXR 3.1.5 deadlocks on its own lock, so this always reports success. The sink
- * keeps the error, and the caller checks it. */
+/* Always reports success: after a failed write OpenEXR 3.1.5 deadlocks on its own lock. The sink keeps the
+ * error, and the caller checks it. */
 static int64_t write_bytes(exr_const_context_t context, void *user, const void *data, uint64_t size,
                            uint64_t offset, exr_stream_error_func_ptr_t fail) {
     (void)context;
@@ -252,7 +233,7 @@ typedef struct exr_writer {
     int part;
     const char *path;
     int32_t width, height, count;
-    int32_t order[VSH_MAX_CHANNELS]; /* file's channel → index of planes: by name, as EXR keeps them */
+    int32_t order[VSH_MAX_CHANNELS]; /* planes by name, as EXR sorts its channels */
     exr_pixel_type_t type;
     size_t value_size;    /* bytes */
     int32_t lines;        /* scan lines in a chunk */
@@ -276,7 +257,7 @@ static void sort_by_name(const vshi_planes *planes, int32_t *order) {
     }
 }
 
-/* Later calls run after a failure, too: the caller then deletes the file. */
+/* Makes all calls even after a failure: the caller then deletes the file. */
 static exr_result_t write_header(exr_writer *writer, const vshi_planes *planes) {
     const exr_context_t file = writer->context;
     char software[64];
@@ -319,8 +300,8 @@ static void fill_values(const exr_writer *writer, const vshi_planes *planes, con
     }
 }
 
-/* Readers take a chunk for raw if its size is the raw size. OpenEXR up to 3.4.7 writes compressed data of
- * exactly that size, so such chunks are stored raw here (OpenEXR's issue 2306). */
+/* Stores a chunk raw if its compressed size is the raw size: readers expect raw data of that size, but
+ * OpenEXR up to 3.4.7 writes compressed data (OpenEXR's issue 2306). */
 static exr_result_t compress_chunk(exr_encode_pipeline_t *pipeline) {
     const exr_writer *writer = pipeline->encoding_user_data;
     const exr_result_t status = writer->compress(pipeline);
@@ -363,14 +344,17 @@ static exr_result_t write_chunk(exr_writer *writer) {
     return status == EXR_ERR_SUCCESS ? exr_encoding_run(writer->context, writer->part, pipeline) : status;
 }
 
-static double writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
-    (void)format;
-    const int32_t bytes = bits / 8;
-    const double chunk = (double)planes->count * (double)planes->width * bytes * MAX_CHUNK_LINES;
-    return 4.0 * chunk; /* ours, and the encoder's: packed, two steps of compression */
+static double chunk_bytes(const vshi_planes *planes, int32_t bits) {
+    return (double)planes->count * (double)planes->width * (bits / 8) * MAX_CHUNK_LINES;
 }
 
-static vsh_result result_of(exr_writer *writer, vsh_error *error) {
+static double writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
+    (void)format;
+    return 4.0 *
+           chunk_bytes(planes, bits); /* our chunk, and the encoder's: packed, and two steps of compression */
+}
+
+static vsh_result check_writer(exr_writer *writer, vsh_error *error) {
     const int number = writer->sink.error;
     if (number != 0) {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", writer->path,
@@ -397,7 +381,7 @@ static vsh_result end_file(void *user, vsh_error *error) {
         keep_first(&writer->status, exr_finish(&writer->context));
     }
     vshi_sink_close(&writer->sink);
-    const vsh_result result = result_of(writer, error);
+    const vsh_result result = check_writer(writer, error);
     free(writer->chunk);
     free(writer);
     return result;
@@ -407,16 +391,14 @@ static vsh_result begin_file(const char *temporary, const char *path, const vshi
                              const vshi_planes *planes, int32_t bits, void **made, vsh_error *error) {
     (void)format;
     const size_t value_size = bits == 16 ? sizeof(imath_half_bits_t) : sizeof(float);
-    const double chunk_bytes =
-        (double)planes->count * (double)planes->width * (double)value_size * MAX_CHUNK_LINES;
-    if (chunk_bytes > (double)INT32_MAX) {
+    if (chunk_bytes(planes, bits) > (double)INT32_MAX) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: %d pixels of %d channels in a row are more than OpenEXR's 2 GiB a chunk", path,
                          planes->width, planes->count);
     }
     exr_writer *writer;
     vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&writer, 1, sizeof *writer, path, error));
+    VSHI_TRY(VSHI_ALLOCATE(writer, 1, path, error));
     writer->sink = vshi_sink_open(temporary);
     writer->path = path;
     writer->width = planes->width;
@@ -426,14 +408,14 @@ static vsh_result begin_file(const char *temporary, const char *path, const vshi
     writer->value_size = value_size;
     sort_by_name(planes, writer->order);
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
-    setup.error_handler_fn = say_nothing;
+    setup.error_handler_fn = ignore_message;
     setup.user_data = &writer->sink;
     setup.write_fn = write_bytes;
     writer->status = exr_start_write(&writer->context, temporary, EXR_WRITE_FILE_DIRECTLY, &setup);
     if (writer->status == EXR_ERR_SUCCESS) {
         writer->status = write_header(writer, planes);
     }
-    VSHI_TRY_DONE(result_of(writer, error));
+    VSHI_TRY_DONE(check_writer(writer, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&writer->chunk,
                                 (size_t)planes->count * (size_t)writer->lines * (size_t)planes->width,
                                 value_size, path, error));
@@ -461,7 +443,7 @@ static vsh_result add_rows(void *user, const vshi_planes *planes, int32_t rows, 
             writer->status = write_chunk(writer);
         }
     }
-    return result_of(writer, error);
+    return check_writer(writer, error);
 }
 
 const vshi_codec vshi_exr_codec = {begin_file, add_rows, end_file, writer_bytes};

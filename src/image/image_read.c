@@ -1,10 +1,10 @@
-/* Reading images: the file in memory, which reader a file is for, and what a reader process hands over. */
+/* Reads images: chooses the codec, and talks to reader processes. */
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/threads.h"
 #include "extern/module.h"
-#include "image/codec.h"
+#include "image/image.h"
 #include "sandbox/reader.h"
 
 #include <stdio.h>
@@ -39,13 +39,13 @@ vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t wid
     const double bytes = (double)width * (double)height * (double)channels * sizeof(float);
     vsh_image_file *image;
     VSHI_TRY(vshi_check_limit(run, bytes, path, error));
-    VSHI_TRY(vshi_allocate((void **)&image, 1, sizeof *image, path, error));
+    VSHI_TRY(VSHI_ALLOCATE(image, 1, path, error));
     image->width = (int32_t)width;
     image->height = (int32_t)height;
     image->channel_count = (int32_t)channels;
     const size_t texels = (size_t)width * (size_t)height;
-    /* calloc, because its pages are taken when they are first written: a short file that claims to be huge
-     * fails before it costs memory */
+    /* calloc() takes pages at the first write: a short file that claims to be huge fails before it costs
+     * memory */
     image->values = calloc(texels * (size_t)channels, sizeof *image->values);
     image->text = calloc((size_t)channels, sizeof *image->text);
     if (image->values == NULL || image->text == NULL) {
@@ -60,12 +60,6 @@ vsh_result vshi_image_file_new(const char *path, const vsh_run *run, int64_t wid
     }
     *file = image;
     return VSH_OK;
-}
-
-vsh_result vshi_image_job(const char *path, const vsh_run *run, int64_t units, vshi_job **job,
-                          vsh_error *error) {
-    *job = vshi_job_begin(run, "load", (size_t)units);
-    return *job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
 }
 
 void vshi_image_file_name(vsh_image_file *file, int32_t channel, const char *name) {
@@ -104,8 +98,8 @@ void vsh_image_free(vsh_image_file *file) {
     free(file);
 }
 
-/* --- OpenImageIO is loaded when the first file needs it: with it come 240 libraries of formats, which take
- * longer to load (0.2 s) than a small bake takes, and most runs read and write EXR and PNG alone */
+/* --- OpenImageIO is loaded when the first file needs it. It brings 240 libraries of formats; loading them
+ * takes longer (0.2 s) than a small bake, and most runs use only EXR and PNG. */
 
 static vshi_module module = VSHI_MODULE("images of this kind", "oiio", 128 << 20, VSHI_OPENVDB_THREADS);
 
@@ -127,7 +121,7 @@ vsh_result vshi_serve_image(const char *path, vshi_decoder *request, const vsh_r
     const size_t size = (size_t)vshi_decode_count(request, SIZE_MAX / 2);
     const void *bytes = vshi_decode_array(request, size, 1);
     if (!vshi_decoder_ends(request)) {
-        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
+        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader is bad", path);
     }
     VSHI_TRY(size > 0 ? vshi_image_read_bytes(path, bytes, size, run, &file, error)
                       : vsh_image_read(path, run, &file, error));
@@ -155,9 +149,8 @@ static vsh_result decode_attributes(vshi_decoder *decoder, vshi_attributes *attr
         const char *name = vshi_decode_text(decoder, true), *value = vshi_decode_text(decoder, true);
         if (name == NULL || value == NULL || !vshi_attributes_add(attributes, name, value)) {
             vshi_attributes_free(attributes);
-            return name == NULL || value == NULL
-                       ? vshi_answer_fail(path, "an attribute", error)
-                       : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+            return name == NULL || value == NULL ? vshi_answer_fail(path, "an attribute", error)
+                                                 : vshi_fail_memory(error, path);
         }
     }
     return VSH_OK;
@@ -177,7 +170,7 @@ vsh_result vshi_image_decode(vshi_decoder *decoder, const char *path, vsh_image_
     }
     vshi_attributes attributes = {0};
     VSHI_TRY(decode_attributes(decoder, &attributes, path, error));
-    /* none is above 2^31 and 2^8 */
+    /* at most 2^31 × 2^31 × 2^8 */
     const double values = (double)width * (double)height * (double)channels;
     const uint64_t count = values <= (double)VSHI_MAX_VALUES ? width * height * channels : UINT64_MAX;
     const float *from = vshi_decode_array(decoder, count, sizeof *from);
@@ -197,15 +190,15 @@ vsh_result vshi_image_decode(vshi_decoder *decoder, const char *path, vsh_image_
     return result;
 }
 
-/* Has run->reader read the file, or `bytes` that stand for it (NULL: none). */
-static vsh_result read_apart(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
-                             vsh_image_file **file, vsh_error *error) {
+/* Lets run->reader read the file, or `bytes` (may be NULL). */
+static vsh_result read_in_reader(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
+                                 vsh_image_file **file, vsh_error *error) {
     enum { UNITS = 1000 };
     vshi_exchange exchange;
     vshi_answer answer;
     vshi_job *job = NULL;
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(vshi_image_job(path, run, UNITS, &job, error));
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "load", UNITS, path, error));
     VSHI_TRY_DONE(vshi_exchange_begin(&exchange, VSHI_READ_IMAGE, path, run, error));
     vshi_encode_count(&exchange.encoder, bytes != NULL ? bytes->size : 0);
     if (bytes != NULL) {
@@ -219,9 +212,9 @@ done:
     return result;
 }
 
-/* --- which reader a file is for */
+/* --- choosing the codec */
 
-/* Looks at the first bytes: an EXR file is one whatever its ending says. */
+/* The first bytes decide: an EXR file may have any ending. */
 static vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     static const unsigned char exr[] = {0x76, 0x2f, 0x31, 0x01}, png[] = {0x89, 'P', 'N', 'G'};
     unsigned char start[4] = {0};
@@ -258,11 +251,11 @@ vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file *
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return full.reader != NULL ? read_apart(path, NULL, &full, file, error)
+    return full.reader != NULL ? read_in_reader(path, NULL, &full, file, error)
                                : read_file(path, &full, file, error);
 }
 
-static const char *format_of(const unsigned char *bytes, size_t size) {
+static const char *find_format(const unsigned char *bytes, size_t size) {
     static const struct {
         const char *format, *magic;
         size_t length, at;
@@ -278,13 +271,13 @@ static const char *format_of(const unsigned char *bytes, size_t size) {
 
 vsh_result vshi_image_read_bytes(const char *name, const void *at, size_t size, const vsh_run *run,
                                  vsh_image_file **file, vsh_error *error) {
-    const vshi_image_bytes bytes = {at, size, format_of(at, size)};
+    const vshi_image_bytes bytes = {at, size, find_format(at, size)};
     *file = NULL;
     if (bytes.format == NULL) {
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: is neither PNG nor JPEG nor WebP", name);
     }
     if (run->reader != NULL) {
-        return read_apart(name, &bytes, run, file, error);
+        return read_in_reader(name, &bytes, run, file, error);
     }
     if (strcmp(bytes.format, "png") == 0) {
         return vshi_png_read(name, &bytes, run, file, error);

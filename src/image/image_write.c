@@ -1,11 +1,11 @@
-/* Images that are written, whole or as their rows come: what may go into which file, and how. */
-#include "base/attributes.h"
+/* Writes images, whole or row by row: formats, packs, color spaces. */
 #include "base/elementary.h"
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "image/codec.h"
+#include "base/text.h"
+#include "image/image.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,18 +16,18 @@ enum { KEYS = 4, ALPHA = 3 /* index of A */ };
 
 static const char *const keys[KEYS] = {"R", "G", "B", "A"};
 
-/* --- the picture that programs look for, R, G and B, out of channels that have other names */
+/* --- the picture, R, G and B, of channels with other names. Other programs show it. */
 
 /* Channels of an image that make up its picture. */
 typedef struct picture {
-    int32_t rgb[3];                   /* one channel each; -1: all three are vshi_grey_at() of those below */
+    int32_t rgb[3];                   /* one channel each; -1: vshi_grey_at() of the channels below */
     int32_t light_count;              /* channels shadow.NAME */
     int32_t lights[VSH_MAX_CHANNELS]; /* [light_count] */
     int32_t ao;                       /* -1: none */
 } picture;
 
-/* The picture of an image: its irradiance; where there is none, the mean of its lights' shadows times its AO.
- * False where it has none of these, or has channels R, G or B itself. */
+/* Finds the picture of an image: its irradiance, else the mean of its lights' shadows times its AO. Returns
+ * false if it has none of these, or channels R, G or B. */
 static bool find_picture(const vsh_image *image, picture *found) {
     static const char light_prefix[] = "shadow.";
     static const char *const irradiance[3] = {"irradiance.R", "irradiance.G", "irradiance.B"};
@@ -50,9 +50,7 @@ static bool find_picture(const vsh_image *image, picture *found) {
         return true;
     }
     const int32_t sources = found->light_count + (found->ao >= 0 ? 1 : 0);
-    const int32_t only = sources != 1              ? -1
-                         : found->light_count == 1 ? found->lights[0]
-                                                   : found->ao; /* a copy of it */
+    const int32_t only = sources != 1 ? -1 : found->light_count == 1 ? found->lights[0] : found->ao;
     for (int channel = 0; channel < 3; ++channel) {
         found->rgb[channel] = only;
     }
@@ -77,7 +75,7 @@ static void describe_picture(const picture *from, const vsh_image *image, char *
 
 /* --- packs: "R=shadow.sun,G=ao,A=A", parts between commas, each a key, '=' and a channel or 0 or 1 */
 
-/* Words instead of a pack: the named channels alone; the picture alone. */
+/* Words instead of a pack: only the named channels; only the picture. */
 static const char pack_channels[] = "channels", pack_picture[] = "rgb";
 
 typedef struct pack_entry {
@@ -86,16 +84,14 @@ typedef struct pack_entry {
     float constant;
 } pack_entry;
 
-typedef struct pack {
-    pack_entry entries[KEYS];
-} pack;
+typedef pack_entry pack[KEYS]; /* by key */
 
 static bool ends_value(char c) {
     return c == ',' || c == '\0';
 }
 
-/* The channel whose name stands at `value`, up to a comma or the end. Names may have commas in them, so the
- * longest one that fits is taken. -1: none. */
+/* Finds the channel with its name at `value`, before a comma or the end; -1: none. Names may contain commas,
+ * so the longest match wins. */
 static int32_t find_channel(const char *value, const vsh_image *image, size_t *length) {
     int32_t found = -1;
     *length = 0;
@@ -130,8 +126,8 @@ static void list_channels(const vsh_image *image, char *text, size_t capacity) {
              c < image->channel_count ? " and others" : "");
 }
 
-/* Reads the part at *text and moves behind it. */
-static vsh_result parse_part(const char **text, const vsh_image *image, pack *made, vsh_error *error) {
+/* Parses the part at *text and moves to its end. */
+static vsh_result parse_part(const char **text, const vsh_image *image, pack made, vsh_error *error) {
     const char *part = *text;
     const int part_length = (int)strcspn(part, ",");
     const int key = find_key(part);
@@ -140,7 +136,7 @@ static vsh_result parse_part(const char **text, const vsh_image *image, pack *ma
                          "pack: part '%.*s': expected R=, G=, B= or A= and a channel, 0 or 1", part_length,
                          part);
     }
-    if (made->entries[key].given) {
+    if (made[key].given) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "pack: part '%.*s': %s is given twice", part_length, part,
                          keys[key]);
     }
@@ -158,13 +154,12 @@ static vsh_result parse_part(const char **text, const vsh_image *image, pack *ma
         entry.constant = value[0] == '1' ? 1.0f : 0.0f;
         length = 1;
     }
-    made->entries[key] = entry;
+    made[key] = entry;
     *text = value + length;
     return VSH_OK;
 }
 
-static vsh_result parse_pack(const char *text, const vsh_image *image, pack *made, vsh_error *error) {
-    *made = (pack){0};
+static vsh_result parse_pack(const char *text, const vsh_image *image, pack made, vsh_error *error) {
     if (text[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "pack: '' is empty: expected such as R=%s",
                          image->names[0]);
@@ -177,7 +172,7 @@ static vsh_result parse_pack(const char *text, const vsh_image *image, pack *mad
     }
 }
 
-void vsh_image_default_pack(const vsh_image *image, char *text, size_t capacity) {
+void vshi_image_default_pack(const vsh_image *image, char *text, size_t capacity) {
     if (text == NULL || capacity == 0) {
         return;
     }
@@ -200,14 +195,14 @@ void vsh_image_default_pack(const vsh_image *image, char *text, size_t capacity)
     }
     picture found;
     if (image->channel_count <= VSH_MAX_CHANNELS && find_picture(image, &found) && found.rgb[0] >= 0 &&
-        found.rgb[0] != found.rgb[1]) { /* irradiance: a picture as it is */
+        found.rgb[0] != found.rgb[1]) { /* irradiance */
         for (int c = 0; c < 3; ++c) {
             colors[c] = image->names[found.rgb[c]];
         }
         count = 3;
     }
     if (count <= 1) {
-        /* one alone is shown in grey; where there is coverage only, it is that one */
+        /* a single channel is shown in grey; coverage if there is no other */
         const char *only = count == 1 ? colors[0] : alpha;
         colors[0] = colors[1] = colors[2] = only;
     }
@@ -224,17 +219,17 @@ void vsh_image_default_pack(const vsh_image *image, char *text, size_t capacity)
 
 /* --- the plan: formats, bits and planes */
 
-/* How an image is to be written: what the checks found out. */
+/* The plan for writing an image, after all checks. */
 typedef struct write_plan {
     const vshi_codec *codec;
     vshi_format format;
     int32_t bits;                      /* 8, 16 or 32 */
     vshi_planes planes;                /* without values; names are the image's, or static */
     int32_t channel[VSH_MAX_CHANNELS]; /* of the image, for each plane; -1: the plane's constant, or grey */
-    picture picture;                   /* where a plane is grey: what of */
+    picture picture;                   /* of planes that are grey */
 } write_plan;
 
-static int32_t holds(const vsh_image *image, int32_t channel) {
+static int32_t find_content(const vsh_image *image, int32_t channel) {
     return image->holds != NULL && channel >= 0 ? image->holds[channel] : VSH_CHANNEL_DATA;
 }
 
@@ -260,9 +255,9 @@ static vsh_result check_image(const char *path, const vsh_image *image, vsh_erro
                              "%s: channel '%.40s…': the name has more than %d bytes", path, name,
                              VSH_CHANNEL_NAME - 1);
         }
-        if (holds(image, c) < VSH_CHANNEL_DATA || holds(image, c) > VSH_CHANNEL_VECTOR) {
+        if (find_content(image, c) < VSH_CHANNEL_DATA || find_content(image, c) > VSH_CHANNEL_VECTOR) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: channel '%s' holds %d, expected %d … %d", path,
-                             name, holds(image, c), VSH_CHANNEL_DATA, VSH_CHANNEL_VECTOR);
+                             name, find_content(image, c), VSH_CHANNEL_DATA, VSH_CHANNEL_VECTOR);
         }
         for (int32_t other = 0; other < c; ++other) {
             if (strcmp(image->names[other], name) == 0) {
@@ -279,21 +274,21 @@ static const vshi_format exr_format = {
 static const vshi_format png_format = {
     .name = "png", .bits = VSHI_BITS_8 | VSHI_BITS_16, .alpha = true, .max_size = 1000000};
 
-/* A format of OpenImageIO's. */
+/* Plans a format of OpenImageIO. */
 static vsh_result plan_other(const char *path, const char *ending, write_plan *plan, vsh_error *error) {
     static const char others[] = "tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif";
     VSHI_TRY(vshi_oiio_load(path, error));
-    const char *refusal = vshi_oiio()->refusal(path);
+    const char *refusal;
+    const bool found = vshi_oiio()->format(path, &plan->format, &refusal);
     if (refusal != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: '%s' is not written: %s; expected one of exr, png, %s", path, ending, refusal,
                          others);
     }
     plan->codec = &vshi_oiio()->codec;
-    return vshi_oiio()->format(path, &plan->format)
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, png, %s", path,
-                           ending, others);
+    return found ? VSH_OK
+                 : vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, png, %s", path,
+                             ending, others);
 }
 
 static vsh_result plan_format(const char *path, write_plan *plan, vsh_error *error) {
@@ -319,7 +314,7 @@ static vsh_result check_size(const char *path, const vsh_image *image, const vsh
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d × %d pixels: %s has at most %d a side", path,
                          image->width, image->height, format->name, format->max_size);
     }
-    /* the rows of EXR are written as they come */
+    /* EXR is written row by row, so its size has no limit */
     return format->named ? VSH_OK
                          : vshi_check_values(path, image->width, image->height, image->channel_count, error);
 }
@@ -328,8 +323,7 @@ static vsh_result plan_bits(const char *path, int32_t bits, write_plan *plan, vs
     static const struct {
         int32_t bits;
         int32_t flag;
-    } table[] = {
-        {16, VSHI_BITS_16}, {8, VSHI_BITS_8}, {32, VSHI_BITS_32}}; /* the default is the first one had */
+    } table[] = {{16, VSHI_BITS_16}, {8, VSHI_BITS_8}, {32, VSHI_BITS_32}}; /* the first one is the default */
     const int32_t has = plan->format.bits;
     bits = plan->format.named && bits == 0 ? 32 : bits;
     for (size_t i = 0; i < sizeof table / sizeof table[0]; ++i) {
@@ -343,10 +337,9 @@ static vsh_result plan_bits(const char *path, int32_t bits, write_plan *plan, vs
                      (has & VSHI_BITS_32) != 0 ? " 32" : "");
 }
 
-/* Takes from a packing what the format does not have: an error where the caller asked for it by name. */
-static vsh_result fit_pack(const char *path, const vshi_format *format, bool asked, pack *made,
+/* Removes the keys that the format lacks from a pack. Fails if the caller asked for one. */
+static vsh_result fit_pack(const char *path, const vshi_format *format, bool asked, pack entries,
                            vsh_error *error) {
-    pack_entry *entries = made->entries;
     if (!format->alpha && entries[ALPHA].given) {
         if (asked) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: A is given, but %s has no alpha", path,
@@ -371,7 +364,7 @@ static void add_plane(write_plan *plan, int32_t channel, vshi_image_plane plane)
     plan->planes.planes[plan->planes.count++] = plane;
 }
 
-/* R, G and B of the image's picture, if it has one and there is room. */
+/* Adds R, G and B of the image's picture, if it has one and there is room. */
 static bool add_picture(const vsh_image *image, write_plan *plan) {
     picture found;
     if (!find_picture(image, &found) || plan->planes.count + 3 > VSH_MAX_CHANNELS) {
@@ -387,7 +380,7 @@ static bool add_picture(const vsh_image *image, write_plan *plan) {
     return true;
 }
 
-/* The picture alone: R, G, B, and A where the image and the format have it. */
+/* Plans the picture alone: R, G, B, and A if image and format have it. */
 static vsh_result plan_picture(const char *path, const vsh_image *image, write_plan *plan, vsh_error *error) {
     if (!add_picture(image, plan)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
@@ -406,19 +399,19 @@ static vsh_result plan_picture(const char *path, const vsh_image *image, write_p
 static vsh_result plan_pack(const char *path, const vsh_image *image, const char *text, write_plan *plan,
                             vsh_error *error) {
     char default_text[KEYS * (VSH_CHANNEL_NAME + 3)];
-    pack made;
-    vsh_image_default_pack(image, default_text, sizeof default_text);
-    VSHI_TRY(parse_pack(text != NULL ? text : default_text, image, &made, error));
-    VSHI_TRY(fit_pack(path, &plan->format, text != NULL, &made, error));
+    pack made = {{0}};
+    vshi_image_default_pack(image, default_text, sizeof default_text);
+    VSHI_TRY(parse_pack(text != NULL ? text : default_text, image, made, error));
+    VSHI_TRY(fit_pack(path, &plan->format, text != NULL, made, error));
     for (int key = 0; key < KEYS; ++key) {
-        const pack_entry *entry = &made.entries[key];
-        /* formats but EXR have R, G and B whether given or not: what is not given is 0 */
+        const pack_entry *entry = &made[key];
+        /* formats other than EXR always have R, G and B: by default 0 */
         if (entry->given || (!plan->format.named && key < (plan->format.grey ? 1 : ALPHA))) {
             const int32_t channel = entry->given ? entry->channel : -1;
             add_plane(plan, channel,
                       (vshi_image_plane){.name = keys[key],
                                          .constant = entry->constant,
-                                         .is_signed = holds(image, channel) == VSH_CHANNEL_VECTOR});
+                                         .is_signed = find_content(image, channel) == VSH_CHANNEL_VECTOR});
         }
     }
     return VSH_OK;
@@ -450,7 +443,7 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
 
 /* --- color spaces */
 
-double vsh_srgb_to_linear(double encoded) {
+double vshi_srgb_to_linear(double encoded) {
     return vshi_from_srgb(encoded);
 }
 
@@ -458,7 +451,7 @@ static float encode_srgb(float value) {
     return (float)vshi_to_srgb((double)value);
 }
 
-/* Which planes are light, and which go through a curve. */
+/* Finds the planes that are light, and those with a curve. */
 static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t color_space, write_plan *plan,
                               vsh_error *error) {
     if (vsh_get_name(VSH_NAMES_COLOR, color_space) == NULL) {
@@ -478,10 +471,10 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
     for (int32_t p = 0; p < planes->count; ++p) {
         vshi_image_plane *plane = &planes->planes[p];
         const int32_t channel = plan->channel[p];
-        plane->is_color = holds(image, channel) == VSH_CHANNEL_LIGHT;
+        plane->is_color = find_content(image, channel) == VSH_CHANNEL_LIGHT;
         if (strcmp(plane->name, keys[ALPHA]) != 0) {
             lights += plane->is_color;
-            others += !plane->is_color && (channel >= 0 || plane->is_grey); /* 0 and 1 are either */
+            others += !plane->is_color && (channel >= 0 || plane->is_grey); /* not constants */
         }
     }
     const bool encode =
@@ -496,7 +489,7 @@ static vsh_result plan_colors(const char *path, const vsh_image *image, int32_t 
     return VSH_OK;
 }
 
-/* Errors: as of vsh_image_check(), but for the disk's. */
+/* Errors: as vsh_image_check(), without those of the disk. */
 static vsh_result make_plan(const char *path, const vsh_image *image, const vsh_image_options *options,
                             write_plan *plan, vsh_error *error) {
     vsh_image_options full = vsh_image_options_default();
@@ -517,7 +510,7 @@ static vsh_result make_plan(const char *path, const vsh_image *image, const vsh_
 
 /* --- writing */
 
-struct vsh_image_writer {
+struct vshi_image_writer {
     write_plan plan;
     vshi_output output;
     char *path;
@@ -528,7 +521,7 @@ struct vsh_image_writer {
     vsh_image_clipping clipping;
 };
 
-static void free_writer(vsh_image_writer *writer) {
+static void free_writer(vshi_image_writer *writer) {
     if (writer == NULL) {
         return;
     }
@@ -538,17 +531,13 @@ static void free_writer(vsh_image_writer *writer) {
     free(writer);
 }
 
-static vsh_result copy_texts(vsh_image_writer *writer, const char *path, const vsh_image *image,
+static vsh_result copy_texts(vshi_image_writer *writer, const char *path, const vsh_image *image,
                              vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&writer->names, (size_t)image->channel_count, sizeof *writer->names, path,
-                           error));
-    writer->path = strdup(path);
-    if (writer->path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    }
+    VSHI_TRY(VSHI_ALLOCATE(writer->names, (size_t)image->channel_count, path, error));
+    VSHI_TRY(vshi_copy_text(&writer->path, path, path, error));
     writer->channel_count = image->channel_count;
     for (int32_t c = 0; c < image->channel_count; ++c) {
-        strcpy(writer->names[c], image->names[c]); /* the plan has looked at their lengths */
+        strcpy(writer->names[c], image->names[c]); /* check_image() checked the lengths */
     }
     for (int32_t p = 0; p < writer->plan.planes.count; ++p) {
         vshi_image_plane *plane = &writer->plan.planes.planes[p];
@@ -560,12 +549,12 @@ static vsh_result copy_texts(vsh_image_writer *writer, const char *path, const v
     return VSH_OK;
 }
 
-/* `whole`: the image is in memory, which no image of more than VSHI_MAX_VALUES is. */
+/* `whole`: the image is in memory, so it has at most VSHI_MAX_VALUES. */
 static vsh_result create(const char *path, const vsh_image *image, const vsh_image_options *options,
-                         bool whole, vsh_image_writer **writer, vsh_error *error) {
-    vsh_image_writer *made;
+                         bool whole, vshi_image_writer **writer, vsh_error *error) {
+    vshi_image_writer *made;
     vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "image", error));
+    VSHI_TRY(VSHI_ALLOCATE(made, 1, "image", error));
     VSHI_TRY_DONE(make_plan(path, image, options, &made->plan, error));
     if (whole) {
         VSHI_TRY_DONE(vshi_check_values(path, image->width, image->height, image->channel_count, error));
@@ -582,16 +571,17 @@ done:
     return result;
 }
 
-vsh_result vsh_image_writer_create(const char *path, const vsh_image *image, const vsh_image_options *options,
-                                   vsh_image_writer **writer, vsh_error *error) {
+vsh_result vshi_image_writer_create(const char *path, const vsh_image *image,
+                                    const vsh_image_options *options, vshi_image_writer **writer,
+                                    vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(writer);
     *writer = NULL;
     return create(path, image, options, false, writer, error);
 }
 
-/* Texels of light that integers cut. */
-static void count_clipped(vsh_image_writer *writer, size_t texels, const float *const *planes) {
+/* Counts texels of light over 1, which integers cut. */
+static void count_clipped(vshi_image_writer *writer, size_t texels, const float *const *planes) {
     const vshi_planes *list = &writer->plan.planes;
     const float *light[KEYS];
     const float *coverage = NULL;
@@ -619,16 +609,16 @@ static void count_clipped(vsh_image_writer *writer, size_t texels, const float *
     }
 }
 
-vsh_result vsh_image_writer_get_clipping(const vsh_image_writer *writer, vsh_image_clipping *clipping,
-                                         vsh_error *error) {
+vsh_result vshi_image_writer_get_clipping(const vshi_image_writer *writer, vsh_image_clipping *clipping,
+                                          vsh_error *error) {
     VSHI_NEEDS(writer);
     VSHI_NEEDS(clipping);
     *clipping = writer->clipping;
     return VSH_OK;
 }
 
-vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const float *const *planes,
-                                vsh_error *error) {
+vsh_result vshi_image_writer_add(vshi_image_writer *writer, int32_t rows, const float *const *planes,
+                                 vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(writer);
     vshi_planes *list = &writer->plan.planes;
@@ -657,7 +647,7 @@ vsh_result vsh_image_writer_add(vsh_image_writer *writer, int32_t rows, const fl
     return writer->plan.codec->add(writer->file, list, rows, error);
 }
 
-vsh_result vsh_image_writer_finish(vsh_image_writer *writer, vsh_error *error) {
+vsh_result vshi_image_writer_finish(vshi_image_writer *writer, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(writer);
     const int32_t height = writer->plan.planes.height;
@@ -665,7 +655,7 @@ vsh_result vsh_image_writer_finish(vsh_image_writer *writer, vsh_error *error) {
     if (writer->row < height) {
         result = vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d of %d rows were given", writer->path,
                            writer->row, height);
-        vsh_image_writer_abandon(writer);
+        vshi_image_writer_abandon(writer);
         return result;
     }
     VSHI_TRY_DONE(writer->plan.codec->end(writer->file, error));
@@ -675,7 +665,7 @@ done:
     return result;
 }
 
-void vsh_image_writer_abandon(vsh_image_writer *writer) {
+void vshi_image_writer_abandon(vshi_image_writer *writer) {
     VSHI_FLOATS;
     if (writer != NULL) {
         writer->plan.codec->end(writer->file, NULL);
@@ -686,14 +676,17 @@ void vsh_image_writer_abandon(vsh_image_writer *writer) {
 vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_image_options *options,
                            vsh_error *error) {
     VSHI_FLOATS;
-    vsh_image_writer *writer;
+    vshi_image_writer *writer;
     VSHI_TRY(create(path, image, options, true, &writer, error));
-    const vsh_result result = vsh_image_writer_add(writer, image->height, image->planes, error);
+    const vsh_result result = vshi_image_writer_add(writer, image->height, image->planes, error);
     if (result != VSH_OK) {
-        vsh_image_writer_abandon(writer);
+        vshi_image_writer_abandon(writer);
         return result;
     }
-    return vsh_image_writer_finish(writer, error);
+    if (options != NULL && options->clipping != NULL) {
+        vshi_image_writer_get_clipping(writer, options->clipping, NULL);
+    }
+    return vshi_image_writer_finish(writer, error);
 }
 
 vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_image_options *options,
@@ -704,7 +697,7 @@ vsh_result vsh_image_check(const char *path, const vsh_image *image, const vsh_i
     return vshi_output_check(path, error);
 }
 
-uint64_t vsh_image_writer_bytes(const char *path, const vsh_image *image, const vsh_image_options *options) {
+uint64_t vshi_image_writer_bytes(const char *path, const vsh_image *image, const vsh_image_options *options) {
     write_plan plan;
     return make_plan(path, image, options, &plan, NULL) == VSH_OK
                ? (uint64_t)plan.codec->bytes(&plan.format, &plan.planes, plan.bits)

@@ -1,6 +1,6 @@
-// The module of image formats: every format but OpenEXR and PNG. A table, and not
-// OpenImageIO, chooses formats: those that keep data with OpenImageIO 2.4. docs/formats.md lists them.
-#include "image/codec.h"
+// The module of image formats: all but OpenEXR and PNG. A table lists the formats that keep data with
+// OpenImageIO 2.4, because OpenImageIO accepts others too. docs/formats.md lists them.
+#include "image/image.h"
 
 #include "base/file.h"
 #include "extern/guard.h"
@@ -30,9 +30,9 @@ constexpr int32_t BITS_8_16 = VSHI_BITS_8 | VSHI_BITS_16;
 constexpr int32_t BITS_ALL = BITS_8_16 | VSHI_BITS_32;
 constexpr int32_t ANY_SIZE = INT_MAX;
 
-// Sizes are the formats' own limits, but for libjpeg, which ends the process over its own. webp and gif drop
-// the colour of transparent pixels, so they count as having no alpha. `held` comes from measured peak memory:
-// 4096² pixels, written eight rows at a time.
+// Sizes are the formats' own limits; jpeg's is lower, because libjpeg ends the process above its own. webp
+// and gif drop the colour of transparent pixels, so they count as formats without alpha. `held` comes from
+// measured peak memory: 4096² pixels, written eight rows at a time.
 constexpr vshi_format writable[] = {
     // name, bits, alpha, grey, named, size, held
     {"tiff", BITS_ALL, true, false, false, ANY_SIZE, 0.0},
@@ -47,7 +47,7 @@ constexpr vshi_format writable[] = {
     {"gif", VSHI_BITS_8, false, false, false, 65535, 8.2},
 };
 
-// Endings, and formats with all of theirs, that OpenImageIO knows and may even write, but not rightly.
+// Endings and formats that OpenImageIO knows, but does not write correctly.
 constexpr char UNCHECKED[] = "OpenImageIO 2.4 does not tell whether its bytes arrived";
 constexpr struct {
     const char *name;
@@ -72,20 +72,20 @@ constexpr struct {
 // ico write past their buffers, iff accepts truncated files, and fits returns the row below.
 const char *const readable_only[] = {"cineon", "dds", "heif", "psd", "softimage"};
 
-constexpr int64_t BAND = int64_t(1) << 20; // values, but a row at least
-constexpr int64_t MOST_ROWS = 1024;        // some formats seek for each
+constexpr int64_t BAND = int64_t(1) << 20; // values, at least a row
+constexpr int64_t MOST_ROWS = 1024;        // some formats seek for each row
 
-// Lower case, without the dot.
-std::string ending_of(const char *path) {
+// Returns the ending in lower case, without the dot.
+std::string find_ending(const char *path) {
     std::string result = vshi_path_ending(path);
     std::transform(result.begin(), result.end(), result.begin(),
                    [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c + 32 : c); });
     return result;
 }
 
-// OpenImageIO's name of the format with this ending, "tiff" for "tif", out of "tiff:tif,tiff,tx;jpeg:jpg,…";
-// "" for none.
-std::string format_of_ending(const std::string &ending) {
+// Returns OpenImageIO's name of the format with this ending, "tiff" for "tif", or "". The list is
+// "tiff:tif,tiff,tx;jpeg:jpg,…".
+std::string find_name(const std::string &ending) {
     const std::string list = OIIO::get_string_attribute("extension_list");
     for (size_t at = 0; !ending.empty() && at < list.size();) {
         const size_t end = std::min(list.find(';', at), list.size());
@@ -108,29 +108,20 @@ bool is_readable(const std::string &name) {
            std::any_of(std::begin(writable), std::end(writable), is);
 }
 
-// Rows that are handed over at a time.
-int rows_of_band(int64_t width, int64_t height, int64_t count) {
+// Returns the number of rows that OpenImageIO gets at a time.
+int count_band_rows(int64_t width, int64_t height, int64_t count) {
     return static_cast<int>(std::clamp<int64_t>(BAND / (width * count), 1, std::min(height, MOST_ROWS)));
 }
 
-const char *refusal_of(const char *path) {
-    const char *reason = nullptr;
-    guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
-        const std::string ending = ending_of(path);
-        const std::string format = format_of_ending(ending);
-        for (const auto &entry : refused) {
-            reason = ending == entry.name || format == entry.name ? entry.reason : reason;
-        }
-        return VSH_OK;
-    });
-    return reason;
-}
-
-bool find_format(const char *path, vshi_format *format) {
+bool find_format(const char *path, vshi_format *format, const char **refusal) {
     bool found = false;
+    *refusal = nullptr;
     guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
-        const std::string ending = ending_of(path);
-        const std::string name = format_of_ending(ending);
+        const std::string ending = find_ending(path);
+        const std::string name = find_name(ending);
+        for (const auto &entry : refused) {
+            *refusal = ending == entry.name || name == entry.name ? entry.reason : *refusal;
+        }
         for (const vshi_format &entry : writable) {
             if (name == entry.name) {
                 *format = entry;
@@ -145,15 +136,16 @@ bool find_format(const char *path, vshi_format *format) {
 
 // --- reading
 
-// The largest end of a data window: OpenImageIO counts rows by int, and up to 2^26 ahead.
+// The largest end of a data window. OpenImageIO counts rows by int, up to 2^26 beyond the end.
 constexpr int64_t LARGEST_END = int64_t(1) << 30;
 
-// Rows of the file, interleaved, into the planes of the image.
+// Copies rows of the file, which are interleaved, into the planes of the image.
 vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &image, vshi_job *job,
                      vsh_error *error) {
     const OIIO::ImageSpec &spec = input.spec();
     const bool tiled = spec.tile_width > 0;
-    const int step = tiled ? spec.tile_height : rows_of_band(image.width, image.height, image.channel_count);
+    const int step =
+        tiled ? spec.tile_height : count_band_rows(image.width, image.height, image.channel_count);
     const size_t width = static_cast<size_t>(image.width);
     const size_t count = static_cast<size_t>(image.channel_count);
     const size_t texels = width * static_cast<size_t>(image.height);
@@ -179,17 +171,15 @@ vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &
                 plane[i] = rows[i * count + c];
             }
         }
-        if (vshi_job_advance(job, static_cast<size_t>(step))) {
-            return vshi_job_fail_cancelled(job, error);
-        }
+        VSHI_TRY(vshi_job_step(job, static_cast<size_t>(step), error));
     }
     return VSH_OK;
 }
 
 vsh_result read_file(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
                      vsh_image_file **file, vsh_error *error) {
-    const std::string ending = bytes != nullptr ? bytes->format : ending_of(path);
-    const std::string name = bytes != nullptr ? bytes->format : format_of_ending(ending);
+    const std::string ending = bytes != nullptr ? bytes->format : find_ending(path);
+    const std::string name = bytes != nullptr ? bytes->format : find_name(ending);
     if (!is_readable(name)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: ending '%s': no image format that is read", path,
                          ending.c_str());
@@ -234,7 +224,7 @@ vsh_result read_file(const char *path, const vshi_image_bytes *bytes, const vsh_
         vshi_image_file_name(image, c, std::string(spec.channel_name(c)).c_str());
     }
     vshi_job *begun = nullptr;
-    VSHI_TRY(vshi_image_job(path, run, image->height, &begun, error));
+    VSHI_TRY(vshi_job_open(&begun, run, "load", static_cast<size_t>(image->height), path, error));
     const std::unique_ptr<vshi_job, void (*)(vshi_job *)> job(begun, vshi_job_end);
     VSHI_TRY(read_rows(*input, path, *image, job.get(), error));
     *file = owner.release();
@@ -249,8 +239,8 @@ vsh_result read_image(const char *path, const vshi_image_bytes *bytes, const vsh
 
 // --- writing
 
-// OpenImageIO's own file writing does not look at the result of its last flush, and its jpeg writer ends the
-// process when a write fails.
+// Replaces OpenImageIO's own files, which ignore the result of the last flush. Its jpeg writer ends the
+// process after a failed write.
 class CheckedFile final : public OIIO::Filesystem::IOProxy {
   public:
     explicit CheckedFile(const char *path) : IOProxy(path, Write), sink_(vshi_sink_open(path)) {}
@@ -259,7 +249,7 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
     CheckedFile &operator=(const CheckedFile &) = delete;
 
     const char *proxytype() const override { return "checked"; } // "file" would promise a FILE *
-    void close() override {}                                     // finish() does, when all is written
+    void close() override {}                                     // finish() closes
     size_t size() const override {
         const off_t end = sink_.file >= 0 ? ::lseek(sink_.file, 0, SEEK_END) : 0;
         return end > 0 ? static_cast<size_t>(end) : 0;
@@ -279,19 +269,19 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
         return done;
     }
     size_t pwrite(const void *data, size_t count, int64_t offset) override {
-        // A failure is kept for finish() and not told: libjpeg would end the process.
+        // Keeps a failure for finish() and reports success: otherwise libjpeg ends the process.
         vshi_sink_write(&sink_, data, count, static_cast<uint64_t>(offset));
         return count;
     }
     int error() const { return sink_.error; } // so far
-    // Closes; the first error of all, or 0.
+    // Closes the file. Returns the first error, or 0.
     int finish() { return vshi_sink_close(&sink_); }
 
   private:
     vshi_sink sink_;
 };
 
-// Rows [first, last) of the planes, interleaved into `rows`.
+// Interleaves rows [first, last) of the planes into `rows`.
 template <typename Value>
 void interleave(const vshi_planes &planes, int32_t first, int32_t last, Value *rows) {
     const size_t width = static_cast<size_t>(planes.width), count = static_cast<size_t>(planes.count);
@@ -319,7 +309,7 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const std::string &format, 
     }
     spec.attribute("oiio:BitsPerSample", static_cast<int>(type.size()) * 8);
     if (format == "jpeg") {
-        // R, G and B are unrelated data here: halving the resolution of their differences would mix them
+        // R, G and B may be unrelated data, which chroma subsampling would mix
         spec.attribute("compression", "jpeg:95");
         spec.attribute("jpeg:subsampling", "4:4:4");
     } else if (format == "webp") {
@@ -329,12 +319,12 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const std::string &format, 
         spec.attribute("tiff:write_exif", 0); // there is none, and libtiff 4.5 refuses the empty one
     }
     if (planes.is_srgb && (format == "tiff" || format == "jpeg")) {
-        spec.attribute("oiio:ColorSpace", "sRGB"); // data says nothing: what it was would be undone
+        spec.attribute("oiio:ColorSpace", "sRGB"); // not for data: readers would undo the curve
     }
     return spec;
 }
 
-// The header of dpx holds the temporary file's name: same input, same bytes.
+// Removes the temporary file's name from the header of dpx: same input, same bytes.
 int clear_name(const char *temporary) {
     constexpr off_t PLACE = 36;
     constexpr size_t SIZE = 100;
@@ -347,9 +337,8 @@ int clear_name(const char *temporary) {
     return number;
 }
 
-// Values of `bits` bits for OpenImageIO: integers are made by us, and no value is multiplied by alpha or sent
-// through a transfer curve. Rows are gathered until there are as many as are handed over at a time, whatever
-// the caller has of them.
+// Writes values of `bits` bits through OpenImageIO. This class makes the integers, without alpha or transfer
+// curves, and collects rows into bands.
 class Writer {
   public:
     Writer(const char *temporary, const char *path, const vshi_format &format, const vshi_planes &planes,
@@ -380,7 +369,7 @@ class Writer {
             return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: this OpenImageIO writes %s as %d × %s only",
                              path_, format_.name, output_->spec().nchannels, output_->spec().format.c_str());
         }
-        step_ = rows_of_band(width_, height_, count_);
+        step_ = count_band_rows(width_, height_, count_);
         rows_.resize(row_bytes() * static_cast<size_t>(step_));
         return VSH_OK;
     }
@@ -410,7 +399,7 @@ class Writer {
 
     vsh_result close(vsh_error *error) {
         const bool whole = row_ == height_;
-        if (row_ == 0 && output_ != nullptr) { // the writer of JPEG 2000 loses its image where no row came
+        if (row_ == 0 && output_ != nullptr) { // without rows, the writer of JPEG 2000 leaks its image
             filled_ = step_;
             flush(nullptr);
         }
@@ -440,7 +429,7 @@ class Writer {
         return text.empty() ? "the writer gave no reason" : text;
     }
 
-    // A disk that is full says more than the writer's own words.
+    // The file's error, such as a full disk, is more exact than the writer's message.
     vsh_result flush(vsh_error *error) {
         const int first = row_, last = row_ + filled_;
         row_ = last;
@@ -457,7 +446,7 @@ class Writer {
     const vshi_format format_;
     const int32_t width_, height_, count_;
     const OIIO::TypeDesc type_;
-    CheckedFile file_; // outlives the writer, which may still use it when it goes
+    CheckedFile file_; // declared before output_, whose destructor may use it
     std::unique_ptr<OIIO::ImageOutput> output_;
     std::vector<unsigned char> rows_;
     int32_t step_ = 0, filled_ = 0, row_ = 0;
@@ -487,13 +476,13 @@ vsh_result end_file(void *user, vsh_error *error) {
 
 double writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
     const double values = static_cast<double>(planes->width) * planes->height * planes->count;
-    const double step = rows_of_band(planes->width, planes->height, planes->count);
+    const double step = count_band_rows(planes->width, planes->height, planes->count);
     const double rows = step * planes->width * planes->count;
-    return (bits / 8) * (4.0 * rows + format->held * values); // rows: ours, and the format's on their way
+    return (bits / 8) * (4.0 * rows + format->held * values); // 4: our rows, and copies of the format
 }
 
 } // namespace
 
-// Every symbol of the module but this one is hidden (module.map).
+// The module shows this symbol only (module.map).
 const vshi_oiio_table vshi_oiio_module = {
-    VSHI_VERSION, find_format, refusal_of, {begin_file, add_rows, end_file, writer_bytes}, read_image};
+    VSHI_VERSION, find_format, {begin_file, add_rows, end_file, writer_bytes}, read_image};

@@ -1,7 +1,7 @@
-/* PNG files through libpng, whose messages and jumps stay within. */
+/* PNG files through libpng. Its messages and jumps stay in this file. */
 #include "base/file.h"
 #include "base/memory.h"
-#include "image/codec.h"
+#include "image/image.h"
 
 #include <png.h>
 
@@ -24,7 +24,7 @@ static void on_warning(png_structp png, png_const_charp message) {
 
 /* --- reading */
 
-/* All that lives across libpng's longjmp: no local variable does. */
+/* State that survives libpng's longjmp; local variables do not. */
 typedef struct png_reader {
     const char *path;
     const vsh_run *run;
@@ -46,9 +46,6 @@ static vsh_result read_header(png_reader *reader) {
     png_init_io(reader->png, reader->stream);
     png_read_info(reader->png, reader->info);
     png_set_expand(reader->png); /* palettes, fewer than 8 bits and transparent colours to plain channels */
-    if (png_get_bit_depth(reader->png, reader->info) == 16 && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__) {
-        png_set_swap(reader->png);
-    }
     reader->passes = png_set_interlace_handling(reader->png);
     png_read_update_info(reader->png, reader->info);
     reader->bits = png_get_bit_depth(reader->png, reader->info);
@@ -64,13 +61,12 @@ static vsh_result read_header(png_reader *reader) {
     for (int c = 0; c < channels; ++c) {
         vshi_image_file_name(reader->image, c, names[channels - 1][c]);
     }
-    /* its pages are taken when they are first written, as those of the image */
+    /* calloc() takes pages at the first write, as for the image */
     reader->rows = calloc(reader->passes > 1 ? height : 1, reader->row_bytes);
-    return reader->rows != NULL ? vshi_image_job(reader->path, reader->run, (int64_t)height * reader->passes,
-                                                 &reader->job, reader->error)
-                                : vshi_fail(reader->error, VSH_ERROR_MEMORY,
-                                            "%s: the system refused memory for rows of %zu bytes",
-                                            reader->path, reader->row_bytes);
+    return reader->rows == NULL
+               ? vshi_fail_memory(reader->error, reader->path)
+               : vshi_job_open(&reader->job, reader->run, "load", (size_t)height * (size_t)reader->passes,
+                               reader->path, reader->error);
 }
 
 static void store_row(const png_reader *reader, const unsigned char *row, int32_t y) {
@@ -80,13 +76,9 @@ static void store_row(const png_reader *reader, const unsigned char *row, int32_
     for (size_t c = 0; c < count; ++c) {
         float *plane = image->values + (c * (size_t)image->height + (size_t)y) * width;
         for (size_t x = 0; x < width; ++x) {
-            if (reader->bits == 8) {
-                plane[x] = (float)row[x * count + c] / 255.0f;
-            } else {
-                uint16_t value;
-                memcpy(&value, row + (x * count + c) * sizeof value, sizeof value);
-                plane[x] = (float)value / 65535.0f;
-            }
+            const size_t i = x * count + c;
+            plane[x] = reader->bits == 8 ? (float)row[i] / 255.0f
+                                         : (float)(row[2 * i] << 8 | row[2 * i + 1]) / 65535.0f;
         }
     }
 }
@@ -100,23 +92,21 @@ static vsh_result read_rows(png_reader *reader) {
             if (pass == reader->passes - 1) {
                 store_row(reader, row, y);
             }
-            if (vshi_job_advance(reader->job, 1)) {
-                return vshi_job_fail_cancelled(reader->job, reader->error);
-            }
+            VSHI_TRY(vshi_job_step(reader->job, 1, reader->error));
         }
     }
     png_read_end(reader->png, NULL);
     return VSH_OK;
 }
 
-/* The text that stands before the image. */
+/* Reads the texts before the image. */
 static vsh_result read_texts(png_reader *reader) {
     png_textp texts = NULL;
     const int count = png_get_text(reader->png, reader->info, &texts, NULL);
     for (int i = 0; i < count; ++i) {
         const char *value = texts[i].text != NULL ? texts[i].text : "";
         if (!vshi_attributes_add(&reader->image->attributes, texts[i].key, value)) {
-            return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+            return vshi_fail_memory(reader->error, reader->path);
         }
     }
     return VSH_OK;
@@ -126,7 +116,7 @@ static vsh_result read_all(png_reader *reader) {
     reader->png = png_create_read_struct(PNG_LIBPNG_VER_STRING, reader->message, on_error, on_warning);
     reader->info = reader->png != NULL ? png_create_info_struct(reader->png) : NULL;
     if (reader->info == NULL) {
-        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+        return vshi_fail_memory(reader->error, reader->path);
     }
     if (setjmp(png_jmpbuf(reader->png)) != 0) {
         return vshi_fail(reader->error, VSH_ERROR_READ, "%s: could not be read as png: %s", reader->path,
@@ -145,9 +135,9 @@ vsh_result vshi_png_read(const char *path, const vshi_image_bytes *bytes, const 
     if (bytes == NULL) {
         VSHI_TRY(vshi_input_open(path, path, UINT64_MAX, &reader.stream, &size, error));
     } else {
-        reader.stream = fmemopen((void *)(uintptr_t)bytes->at, bytes->size, "rb"); /* which only reads */
+        reader.stream = fmemopen((void *)(uintptr_t)bytes->at, bytes->size, "rb"); /* only reads */
         if (reader.stream == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+            return vshi_fail_memory(error, path);
         }
     }
     const vsh_result result = read_all(&reader);
@@ -163,14 +153,14 @@ vsh_result vshi_png_read(const char *path, const vshi_image_bytes *bytes, const 
     return VSH_OK;
 }
 
-/* --- writing row by row, into a file or into memory */
+/* --- writing row by row, into a file or memory */
 
-/* Begins as zeros; its address is to stay. */
+/* Begins as zeros; must not move. */
 typedef struct png_writer {
     png_structp png;
     png_infop info;
     bool to_file;
-    vshi_sink sink;        /* the file; its errno says more than libpng */
+    vshi_sink sink;        /* the file; its errno is more exact than libpng's messages */
     unsigned char *bytes;  /* in memory */
     size_t size, capacity; /* written so far; of `bytes` */
     bool out_of_memory;
@@ -185,12 +175,12 @@ typedef struct png_header {
     int32_t width, height;
     int32_t channels;           /* 1: Y, 2: Y A, 3: R G B, 4: R G B A */
     int32_t bits;               /* 8 or 16 */
-    bool is_srgb;               /* says so: with chunks sRGB, gAMA and cHRM */
-    const vsh_attribute *texts; /* [text_count], ahead of the rows */
+    bool is_srgb;               /* adds the chunks sRGB, gAMA and cHRM */
+    const vsh_attribute *texts; /* [text_count], before the rows */
     size_t text_count;
 } png_header;
 
-/* --- what libpng calls */
+/* --- callbacks of libpng */
 
 static void on_write(png_structp png, png_bytep bytes, size_t size) {
     png_writer *writer = png_get_io_ptr(png);
@@ -217,7 +207,7 @@ static void on_flush(png_structp png) {
     (void)png;
 }
 
-/* When memory runs out, libpng may drop a text and go on, so failures are noted here. */
+/* Notes failures: without memory, libpng may drop a text and go on. */
 static png_voidp on_malloc(png_structp png, png_alloc_size_t size) {
     png_writer *writer = png_get_mem_ptr(png);
     void *memory = malloc(size);
@@ -230,7 +220,7 @@ static void on_free(png_structp png, png_voidp memory) {
     free(memory);
 }
 
-/* --- the parts of a file; false where one failed, with `out_of_memory` or a `message` */
+/* --- the parts of a file. They return false after a failure, with `out_of_memory` or a `message`. */
 
 static void write_info(png_writer *writer, const png_header *header) {
     static const int types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB,
@@ -245,7 +235,7 @@ static void write_info(png_writer *writer, const png_header *header) {
         png_set_sRGB_gAMA_and_cHRM(png, writer->info, PNG_sRGB_INTENT_ABSOLUTE);
     }
     for (size_t i = 0; i < header->text_count; ++i) {
-        /* neither is written to, whatever the types say */
+        /* libpng writes to neither, in spite of the types */
         png_text text = {.compression = PNG_TEXT_COMPRESSION_NONE,
                          .key = (char *)(uintptr_t)header->texts[i].name,
                          .text = (char *)(uintptr_t)header->texts[i].value};
@@ -269,7 +259,7 @@ static bool write_start(png_writer *writer, const png_header *header) {
     return !writer->out_of_memory;
 }
 
-/* `row` is as it stands in the file: [width][channels], of 16 bits the higher byte first. */
+/* `row` is [width][channels], the higher byte of 16 bits first. */
 static bool write_row(png_writer *writer, const unsigned char *row) {
     if (setjmp(png_jmpbuf(writer->png)) != 0) {
         return false;
@@ -287,11 +277,11 @@ static bool write_end(png_writer *writer) {
     return !writer->out_of_memory;
 }
 
-/* --- into a file: nothing is kept but a row, and what libpng and zlib keep of those before */
+/* --- into a file */
 
-static vsh_result result_of(const png_writer *writer, bool done, vsh_error *error) {
+static vsh_result check_writer(const png_writer *writer, bool done, vsh_error *error) {
     if (writer->out_of_memory) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", writer->path);
+        return vshi_fail_memory(error, writer->path);
     }
     if (writer->sink.error != 0 || !done) {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", writer->path,
@@ -305,18 +295,18 @@ static vsh_result end_file(void *user, vsh_error *error) {
     if (writer == NULL) {
         return VSH_OK;
     }
-    /* libpng would object to the missing rows of an abandoned file */
+    /* libpng would complain about missing rows of an abandoned file */
     const bool done = writer->row < writer->height || write_end(writer);
     vshi_sink_close(&writer->sink);
-    const vsh_result result = result_of(writer, done, error);
+    const vsh_result result = check_writer(writer, done, error);
     png_destroy_write_struct(&writer->png, &writer->info);
     free(writer->line);
     free(writer);
     return result;
 }
 
-/* Its texts are the program, the attributes, and vdbshade_color_space. Attributes take the place of ours of
- * the same name but for the last. */
+/* The texts are Software, the attributes, and vdbshade_color_space. An attribute replaces our Software, but
+ * not our vdbshade_color_space. */
 static bool write_head(png_writer *writer, const vshi_planes *planes, vsh_attribute *texts) {
     char software[64];
     snprintf(software, sizeof software, "vdbshade %s", vsh_version());
@@ -351,16 +341,16 @@ static vsh_result begin_file(const char *temporary, const char *path, const vshi
     png_writer *writer;
     vsh_attribute *texts = NULL;
     vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&writer, 1, sizeof *writer, path, error));
+    VSHI_TRY(VSHI_ALLOCATE(writer, 1, path, error));
     *writer = (png_writer){.to_file = true,
                            .sink = vshi_sink_open(temporary),
                            .path = path,
                            .height = planes->height,
                            .bits = bits};
-    VSHI_TRY_DONE(vshi_allocate((void **)&texts, planes->attribute_count + 2, sizeof *texts, path, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(texts, planes->attribute_count + 2, path, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&writer->line, (size_t)planes->width,
                                 (size_t)planes->count * (size_t)(bits / 8), path, error));
-    VSHI_TRY_DONE(result_of(writer, write_head(writer, planes, texts), error));
+    VSHI_TRY_DONE(check_writer(writer, write_head(writer, planes, texts), error));
     *made = writer;
     writer = NULL;
 done:
@@ -369,7 +359,7 @@ done:
     return result;
 }
 
-/* Row y of the planes, channels side by side, the higher byte first. */
+/* Fills the line with row y of the planes, channels side by side, the higher byte first. */
 static void fill_row(const png_writer *writer, const vshi_planes *planes, int32_t y) {
     const size_t width = (size_t)planes->width, count = (size_t)planes->count;
     const size_t size = writer->bits == 16 ? 2 : 1;
@@ -392,7 +382,7 @@ static vsh_result add_rows(void *user, const vshi_planes *planes, int32_t rows, 
     png_writer *writer = user;
     for (int32_t y = 0; y < rows; ++y) {
         fill_row(writer, planes, y);
-        VSHI_TRY(result_of(writer, write_row(writer, writer->line), error));
+        VSHI_TRY(check_writer(writer, write_row(writer, writer->line), error));
     }
     writer->row += rows;
     return VSH_OK;
@@ -400,8 +390,8 @@ static vsh_result add_rows(void *user, const vshi_planes *planes, int32_t rows, 
 
 static double writer_bytes(const vshi_format *format, const vshi_planes *planes, int32_t bits) {
     (void)format;
-    enum { ROWS = 5 /* ours; libpng's: as it is, the one before, and two tried with filters */ };
-    enum { ZLIB = 512 << 10 /* its window and its tables, and libpng's buffer */ };
+    enum { ROWS = 5 /* ours; libpng's: the row, the one before, and two filtered ones */ };
+    enum { ZLIB = 512 << 10 /* zlib's window and tables, and libpng's buffer */ };
     return ROWS * (double)planes->width * planes->count * (bits / 8) + ZLIB;
 }
 
@@ -433,9 +423,8 @@ vsh_result vshi_png_encode(const vshi_png_source *source, const char *what, unsi
         *size = writer.size;
         writer.bytes = NULL;
     } else {
-        result = writer.out_of_memory
-                     ? vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what)
-                     : vshi_fail(error, VSH_ERROR_LIMIT, "%s: %s", what, writer.message);
+        result = writer.out_of_memory ? vshi_fail_memory(error, what)
+                                      : vshi_fail(error, VSH_ERROR_LIMIT, "%s: %s", what, writer.message);
     }
 done:
     png_destroy_write_struct(&writer.png, &writer.info);

@@ -1,4 +1,4 @@
-/* Reads files of JSON into memory of their own, and finds the place of every error in them. */
+/* Reads files of JSON into memory of their own, and finds the place of every error. */
 #include "json/json.h"
 
 #include "base/bytes.h"
@@ -13,12 +13,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const size_t MAX_BYTES = (size_t)64 << 20;
+enum {
+    MAX_BYTES = 64 << 20,
+    MAX_DEPTH = 256, /* SDF trees, the deepest values, end at 64 levels of two steps each */
+    MAX_PATH_TEXT = 320,
+    MAX_KEY_TEXT = 48,
+    PARSE_FLAGS = JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL
+};
 
-/* Deeper than any value that a table can name: SDF trees end at 64 levels of two steps each. */
-enum { MAX_DEPTH = 256, MAX_PATH_TEXT = 320, MAX_KEY_TEXT = 48 };
-
-/* --- places: Jansson gives positions for syntax errors only */
+/* --- places: Jansson tells the position of syntax errors only */
 
 typedef struct place {
     size_t line;   /* from 1 */
@@ -41,40 +44,15 @@ static void skip_space(cursor *c) {
     }
 }
 
-static void skip_string(cursor *c) {
-    ++c->at; /* the opening quote */
-    while (peek(c) != -1 && peek(c) != '"') {
-        c->at += peek(c) == '\\' ? 2 : 1;
-    }
-    c->at = c->at < c->size ? c->at + 1 : c->size;
-}
-
-/* Counts brackets instead of recursing, so that depth costs no stack. */
+/* The text is valid, so Jansson finds the value's end. */
 static void skip_value(cursor *c) {
-    size_t open = 0;
-    do {
-        skip_space(c);
-        const int first = peek(c);
-        const bool opens = first == '{' || first == '[', closes = first == '}' || first == ']';
-        const bool separates = first == ',' || first == ':';
-        if (first == -1 || (open == 0 && (closes || separates))) {
-            return;
-        }
-        open += opens;
-        open -= closes;
-        if (first == '"') {
-            skip_string(c);
-        } else if (opens || closes || separates) {
-            ++c->at;
-        } else {
-            do { /* one at least, whatever it is */
-                ++c->at;
-            } while (peek(c) > ' ' && peek(c) != ',' && peek(c) != '}' && peek(c) != ']');
-        }
-    } while (open > 0);
+    static const size_t flags = PARSE_FLAGS | JSON_DECODE_ANY | JSON_DISABLE_EOF_CHECK;
+    json_error_t end = {.position = 0};
+    json_decref(json_loadb(c->text + c->at, c->size - c->at, flags, &end));
+    c->at += (size_t)end.position;
 }
 
-/* Moves the cursor to child `ordinal` of the object or array that it is at, and *key to the child's key. */
+/* Moves the cursor from an object or array to its child `ordinal`, and *key to the child's key. */
 static bool enter(cursor *c, size_t ordinal, size_t *key) {
     const bool object = peek(c) == '{';
     if (!object && peek(c) != '[') {
@@ -88,7 +66,7 @@ static bool enter(cursor *c, size_t ordinal, size_t *key) {
         }
         *key = c->at;
         if (object) {
-            skip_string(c);
+            skip_value(c);
             skip_space(c);
             ++c->at; /* the colon */
             skip_space(c);
@@ -104,7 +82,7 @@ static bool enter(cursor *c, size_t ordinal, size_t *key) {
     }
 }
 
-/* Line and column of byte `at`. */
+/* Returns the line and column of byte `at`. */
 static place place_of(const vshi_json *reader, size_t at) {
     place found = {1, 1};
     for (size_t i = 0; i < at && i < reader->size; ++i) {
@@ -118,9 +96,9 @@ static place place_of(const vshi_json *reader, size_t at) {
     return found;
 }
 
-/* Where a value, or its `key`, begins. Walks by numbers and not by names: Jansson keeps members in the order
- * of the text and rejects duplicates, so escapes in keys need no decoding here. Where the text does not hold
- * such a path, the place is that of the last step found. */
+/* Returns the begin of a value, or of its `key`. Counts members instead of comparing names, so that escapes
+ * in keys need no decoding: Jansson keeps the order of the text and rejects duplicates. If the text has no
+ * such path, returns the last place on it. */
 static place locate(const vshi_json *reader, const vshi_value *value, bool key) {
     size_t ordinals[MAX_DEPTH];
     while (value->depth > MAX_DEPTH) {
@@ -152,7 +130,7 @@ static void append_path(char *text, const vshi_value *value) {
     }
     append_path(text, value->parent);
     char *end = text + strlen(text);
-    const size_t room = MAX_PATH_TEXT - (size_t)(end - text); /* the rest is left out */
+    const size_t room = MAX_PATH_TEXT - (size_t)(end - text); /* a longer path is cut */
     if (value->key == NULL) {
         snprintf(end, room, "[%zu]", value->ordinal);
         return;
@@ -293,17 +271,16 @@ static vsh_result load(vshi_json *reader, json_t **json) {
         reader->size -= 3;
     }
     const char *zero = memchr(reader->text, '\0', reader->size);
-    if (zero != NULL) { /* Jansson passes over some */
+    if (zero != NULL) { /* Jansson ignores some zeros */
         const place at = place_of(reader, (size_t)(zero - reader->text));
         return vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%zu:%zu: a byte of 0, expected text",
                          reader->path, at.line, at.column);
     }
     json_error_t failure;
     errno = 0;
-    *json =
-        json_loadb(reader->text, reader->size, JSON_REJECT_DUPLICATES | JSON_DECODE_INT_AS_REAL, &failure);
-    if (errno == ENOMEM) { /* Jansson calls it a syntax error, or cuts numbers and words short */
-        return vshi_fail(reader->error, VSH_ERROR_MEMORY, "%s: the system refused memory", reader->path);
+    *json = json_loadb(reader->text, reader->size, PARSE_FLAGS, &failure);
+    if (errno == ENOMEM) { /* Jansson reports a syntax error, or cuts numbers and words */
+        return vshi_fail_memory(reader->error, reader->path);
     }
     return *json != NULL ? VSH_OK
                          : vshi_fail(reader->error, VSH_ERROR_INPUT, "%s:%d:%d: %s", reader->path,
@@ -330,28 +307,17 @@ done:
     return result;
 }
 
-/* Reads in pieces, not by the size that the system told: the file may grow. */
-static vsh_result read_all(const char *path, FILE *file, char **text, size_t *size, vsh_error *error) {
-    size_t capacity = 0;
-    do {
-        capacity = capacity == 0 ? (size_t)1 << 16 : 2 * capacity;
-        capacity = capacity > MAX_BYTES ? MAX_BYTES + 1 : capacity;
-        char *grown = realloc(*text, capacity + 1);
-        if (grown == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused %zu bytes", path, capacity);
-        }
-        *text = grown;
-        errno = 0;
-        *size += fread(*text + *size, 1, capacity - *size, file);
-        if (ferror(file)) {
-            return vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", path, strerror(errno));
-        }
-        if (*size > MAX_BYTES) {
-            return vshi_fail(error, VSH_ERROR_LIMIT, "%s: is larger than the %zu bytes that a scene may have",
-                             path, MAX_BYTES);
-        }
-    } while (*size == capacity);
-    return VSH_OK;
+static vsh_result read_all(const char *path, char **text, size_t *size, vsh_error *error) {
+    FILE *file;
+    uint64_t bytes;
+    VSHI_TRY(vshi_input_open(path, path, MAX_BYTES, &file, &bytes, error));
+    *text = malloc((size_t)bytes + 1);
+    *size = *text != NULL ? fread(*text, 1, (size_t)bytes, file) : 0;
+    const bool failed = ferror(file) != 0;
+    fclose(file);
+    return *text == NULL ? vshi_fail_memory(error, path)
+           : failed      ? vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read", path)
+                         : VSH_OK;
 }
 
 typedef struct reading {
@@ -364,14 +330,10 @@ typedef struct reading {
 static vsh_result read_file(void *user, vsh_error *error) {
     const reading *r = user;
     vshi_json *reader = r->reader;
-    FILE *file;
-    uint64_t told;
     char *text = NULL;
-    size_t size = 0;
-    VSHI_TRY(vshi_input_open(reader->path, reader->path, UINT64_MAX, &file, &told, error));
-    vsh_result result = read_all(reader->path, file, &text, &size, error);
-    fclose(file);
-    VSHI_TRY_DONE(result);
+    size_t size;
+    vsh_result result;
+    VSHI_TRY_DONE(read_all(reader->path, &text, &size, error));
     VSHI_TRY_DONE(vshi_check_limit(reader->run, vshi_json_bytes(text, size), reader->path, error));
     reader->text = text;
     reader->size = size;

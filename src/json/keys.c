@@ -1,7 +1,7 @@
-/* Objects read through tables of keys, and keys as texts: values from a command line, and descriptions for
+/* Reads objects through tables of keys. Keys as texts: values from a command line, and descriptions for
  * people. */
 #include "base/decimal.h"
-#include "base/suggest.h"
+#include "base/text.h"
 #include "json/json.h"
 
 #include <math.h>
@@ -22,7 +22,7 @@ static const char *type_name(json_type type) {
 
 vsh_result vshi_expect(const vshi_json *reader, const vshi_value *value, json_type type) {
     const json_type found = json_typeof(value->json);
-    if (type_name(found) == type_name(type)) { /* one for both kinds of numbers, and of booleans */
+    if (type_name(found) == type_name(type)) { /* both kinds of numbers, and of booleans, have one name */
         return VSH_OK;
     }
     return vshi_json_fail(reader, value, "expected %s, found %s", type_name(type), type_name(found));
@@ -198,7 +198,7 @@ static vsh_result fail_unknown(const vshi_json *reader, const vshi_value *member
     return vshi_json_fail_key(reader, member, "unknown key");
 }
 
-/* Does what follows for the struct when a key was read. */
+/* Sets the key's flag, and calls its function. */
 static void finish_key(const vshi_key *key, void *target) {
     if (key->flag > 0) {
         *(int32_t *)(void *)((char *)target + key->flag) = 1;
@@ -228,7 +228,7 @@ vsh_result vshi_read_object(vshi_json *reader, const vshi_value *object, const v
     }
     for (size_t k = 0; k < table->key_count; ++k) {
         const vshi_key *key = &table->keys[k];
-        /* of an object that is no variant yet, only what all need */
+        /* an object without a variant yet needs only keys of all variants */
         const bool needed = variant == VSHI_ALL ? key->required == VSHI_ALL : (key->required & variant) != 0;
         if (needed && json_object_get(object->json, key->name) == NULL) {
             return vshi_json_fail(reader, object, "key \"%s\" is missing: %s needs it", key->name, what);
@@ -301,8 +301,8 @@ static bool is_whole(const char *text) {
     return *text != '\0' && text[strspn(text, "0123456789")] == '\0';
 }
 
-/* One number, or several as an array; NULL: it is none. */
-static json_t *numbers_of(const char *text, char separator, bool array) {
+/* Parses a number, or several as an array; returns NULL for other texts. */
+static json_t *parse_numbers(const char *text, char separator, bool array) {
     json_t *all = json_array();
     for (const char *at = text;;) {
         const char *end = strchr(at, separator);
@@ -326,8 +326,8 @@ static json_t *numbers_of(const char *text, char separator, bool array) {
     return one;
 }
 
-/* The text as a scene's file would have it; NULL: it is no value, or memory is short. */
-static json_t *json_of(const vshi_key *key, const char *text) {
+/* Converts a text to the JSON of a scene's file; returns NULL if it is no value, or memory is short. */
+static json_t *parse_text(const vshi_key *key, const char *text) {
     json_t *json = NULL;
     switch (key->kind) {
     case VSHI_BOOL:
@@ -336,20 +336,20 @@ static json_t *json_of(const vshi_key *key, const char *text) {
                                                          : NULL;
     case VSHI_NUMBER:
     case VSHI_DEGREES:
-        return numbers_of(text, '\0', false);
+        return parse_numbers(text, '\0', false);
     case VSHI_INTEGER:
-        return is_whole(text) ? numbers_of(text, '\0', false) : NULL;
+        return is_whole(text) ? parse_numbers(text, '\0', false) : NULL;
     case VSHI_VECTOR:
-        return numbers_of(text, ',', true);
+        return parse_numbers(text, ',', true);
     case VSHI_CUSTOM:
-        json = numbers_of(text, key->option.by ? 'x' : ',', false);
+        json = parse_numbers(text, key->option.by ? 'x' : ',', false);
         return json != NULL ? json : json_string(text);
     default:
         return json_string(text);
     }
 }
 
-/* Whether the text is a value of the key. */
+/* Reads the text into a member; returns whether it is a value of the key. */
 static bool read_text(const vshi_key *key, const char *name, const char *text, char *member) {
     if (key->kind == VSHI_STRING || key->kind == VSHI_PATH) {
         if (text == NULL || text[0] == '\0') {
@@ -361,9 +361,9 @@ static bool read_text(const vshi_key *key, const char *name, const char *text, c
     if (text == NULL && key->kind != VSHI_BOOL) {
         return false;
     }
-    vsh_error unused; /* it tells of places in a file; and no such key takes memory of the reader */
+    vsh_error unused; /* it tells a place in a file; these keys allocate no memory of the reader */
     vshi_json reader = {.path = name, .error = &unused, .text = ""};
-    const vshi_value value = {.json = json_of(key, text)};
+    const vshi_value value = {.json = parse_text(key, text)};
     const bool good = value.json != NULL && vshi_read_value(&reader, &value, key, member) == VSH_OK;
     json_decref(value.json);
     return good;

@@ -1,30 +1,50 @@
-/* The content of level sets and volumes, for other rooms. */
+/* Access to level sets and volumes for other rooms. */
 #ifndef VSHI_LEVELSET_ACCESS_H
 #define VSHI_LEVELSET_ACCESS_H
 
 #include "sandbox/reader.h"
 
 #include <vdbshade/grid.h>
-#include <vdbshade/voxels.h>
+#include <vdbshade/volume.h>
 
 #ifdef __cplusplus
 extern "C" {
 #endif
 
+/* Samples a grid at world positions [count][3] into values[count]: interpolates between the eight voxels
+ * around each, as renderers do. Without voxels there the value is the background. It is NaN for positions
+ * that are not finite, or beyond ±2^31 voxels. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT (no
+ * such grid). */
+vsh_result vshi_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
+                              float *values, vsh_error *error);
+
+/* Copies size[0] × size[1] × size[2] voxels from `index_min` on of a .vdb file's grid of numbers, or mask, x
+ * fastest. `values` gets their values: the background for those that are not active. `active` gets 1 for
+ * active ones, 0 for others. Either may be NULL. `name` is as of vsh_voxels_from_vdb(). Errors:
+ * - VSH_ERROR_ARGUMENT: a size below 1, indices beyond 32 bits, more than 2^31 - 1 voxels, run;
+ * - VSH_ERROR_READ: as vsh_grid_read();
+ * - VSH_ERROR_INPUT: no grids, no grid of that name, or no numbers in it;
+ * - VSH_ERROR_LIMIT: the grid passes run->memory_limit or the machine's memory;
+ * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_vdb_copy(const char *path, const char *name, const int32_t index_min[3],
+                         const int32_t size[3], const vsh_run *run, float *values, float *active,
+                         vsh_error *error);
+
 /* --- level sets, for the field */
 
-/* A leaf of the grid's tree: 8³ values at index-space origin + (x, y, z), stored at x·64 + y·8 + z, in world
- * units, negative inside; ± background where |value| reaches the half width. A view into the grid. */
+/* A leaf of the grid's tree: 8³ values at index-space origin + (x, y, z), stored at x·64 + y·8 + z. Values
+ * are in world units, negative inside, ± background beyond the half width. A view into the grid. */
 typedef struct vshi_leaf {
     int32_t origin[3];
     const float *values; /* [512] */
 } vshi_leaf;
 
-/* Number of leaves; fills up to `capacity` of them, sorted by origin (x, then y, then z). Thread safe. */
+/* Returns the number of leaves, and lists up to `capacity` of them by origin (x, then y, then z). Thread
+ * safe. */
 size_t vshi_grid_leaves(const vsh_grid *grid, vshi_leaf *leaves, size_t capacity);
 
-/* For blocks of 8³ voxels, size[0] × size[1] × size[2] of them (z fastest) from index-space voxel `origin`
- * (multiples of 8): -1 where the block's first voxel is inside the solid, else +1. Thread safe. */
+/* Sets the signs of size[0] × size[1] × size[2] blocks of 8³ voxels (z fastest) from index-space voxel
+ * `origin` (multiples of 8): -1 if the block's first voxel is inside the solid, else +1. Thread safe. */
 void vshi_grid_block_signs(const vsh_grid *grid, const int32_t origin[3], const int32_t size[3],
                            int8_t *signs);
 
@@ -32,7 +52,7 @@ void vshi_grid_block_signs(const vsh_grid *grid, const int32_t origin[3], const 
 
 enum { VSHI_BLOCK_VOXELS = 512, VSHI_MASK_WORDS = 8 };
 
-/* A block of 8³ voxels, which is a leaf of the trees: voxel index-space origin + (x, y, z) is bit y·8 + z of
+/* A block of 8³ voxels, a leaf of the trees. Voxel (x, y, z) from its index-space origin is bit y·8 + z of
  * word x, and value x·64 + y·8 + z. */
 typedef struct vshi_block {
     int32_t origin[3]; /* multiples of 8 */
@@ -42,20 +62,23 @@ typedef struct vshi_block {
 /* The blocks of the voxels, sorted by origin (x, then y, then z). */
 const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count);
 
-/* Number of the block with this origin; SIZE_MAX where there is none. Thread safe, as what follows. */
+/* Number of the block with this origin, or SIZE_MAX. This and the next three functions are thread safe. */
 size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]);
 
-/* Longest axis of a voxel, world units; infinite where it is not the same everywhere. */
+/* Longest axis of a voxel, world units; infinite if it varies. */
 double vshi_voxels_longest_axis(const vsh_voxels *voxels);
 
 /* A ball that holds the centres of all voxels of a block. */
 void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius);
 
+/* World position of a voxel's centre, where it is shaded. Cannot fail. */
+void vshi_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]);
+
 /* Centres of `count` voxels of a block, by their numbers in it. */
 void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
                          double (*centres)[3]);
 
-/* One grid of a volume that is made: what its name and metadata say. Strings are copied. */
+/* Name and metadata of one grid of a volume. Strings are copied. */
 typedef struct vshi_channel {
     char name[80];
     char description[200];
@@ -64,29 +87,28 @@ typedef struct vshi_channel {
     double caster_voxel_size;
 } vshi_channel;
 
-/* Begins a volume; `held` bytes are taken already. Errors: VSH_ERROR_LIMIT, for all leaves of all grids;
+/* Begins a volume; `held` bytes are in use. Errors: VSH_ERROR_LIMIT, for all leaves of all grids;
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *channels, size_t count,
                              const vsh_run *run, double held, vsh_volume **volume, vsh_error *error);
 
-/* The values [512] of a block in a grid that is made; background at first. NULL where memory is short.
- * Different blocks on different threads. */
+/* The values [512] of a block, background at first; NULL without memory. Threads may use different blocks. */
 float *vshi_volume_values(vsh_volume *volume, size_t channel, size_t block);
 
 /* Gives all voxels of a block one value, without memory for them. */
 void vshi_volume_set_tile(vsh_volume *volume, size_t channel, size_t block, float value);
 
-/* A value that is there, also once it was settled. */
+/* A value of a block that has values or a tile. */
 float vshi_volume_value(const vsh_volume *volume, size_t channel, size_t block, int voxel);
 
-/* The block's values are final, and these its active voxels: where all are active and one value, memory goes
- * back. Different blocks on different threads. */
+/* Sets a block's active voxels once its values are final. A block of one value, all active, frees its memory.
+ * Threads may use different blocks. */
 void vshi_volume_settle(vsh_volume *volume, size_t block, const uint64_t mask[VSHI_MASK_WORDS]);
 
-/* Makes the trees of what was settled. Errors: VSH_ERROR_MEMORY. */
+/* Makes the trees of settled blocks. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_volume_close(vsh_volume *volume, const vsh_volume_info *counts, vsh_error *error);
 
-/* --- a reader's requests for .vdb files */
+/* --- requests to a reader for .vdb files */
 
 vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_copy;
 

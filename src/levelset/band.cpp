@@ -14,17 +14,16 @@ using openvdb::Vec3d;
 constexpr int LEAF = 8;
 constexpr int REGION = Band::REGION;
 constexpr int LEAVES = REGION / LEAF;
-// A triangle that is less high over its longest edge, voxels, is that edge: in floats nothing could be said
-// of its inside.
+// A triangle less high over its longest edge, voxels, counts as that edge: floats cannot resolve its inside.
 constexpr double FLAT = 2e-4;
-// Half widths, voxels, from which on most triangles that are within reach of a leaf are nowhere the nearest.
+// In bands wider than this, voxels, most triangles within reach of a leaf are nowhere the nearest.
 constexpr double WIDE = 6.0;
-// From a leaf's middle to its farthest voxels, and a rounding; the same by axis.
+// From a leaf's middle to its farthest voxels, rounded up; the same by axis.
 constexpr float LEAF_RADIUS = 6.07f;
 const Vec3d LEAF_HALF(3.5);
-// What may part a voxel from a neighbour is within that neighbour's distance, √3.
+// A triangle between two neighbouring voxels is at most √3 from either.
 constexpr double PARTING = 1.74;
-// What triangles may be farther off than they are found to be, voxels: they are placed in floats.
+// Error of distances to triangles, voxels, whose corners are floats.
 constexpr double SLACK = 0.01;
 
 Vec3d any_normal_to(const Vec3d &a) {
@@ -52,7 +51,7 @@ void set_edge(vshi_frame &frame, int e, const Vec3d &from, const Vec3d &along, d
     frame.high[e] = float(low + length);
 }
 
-// Of corners that are counted from the region's middle.
+// `corner` is relative to the region's middle.
 vshi_frame frame_of(const Corners &corner) {
     vshi_frame frame{};
     Corners edge;
@@ -69,8 +68,8 @@ vshi_frame frame_of(const Corners &corner) {
     const Vec3d normal = flat ? any_normal_to(edge[longest]) : area / twice;
     set_row(frame.row[VSHI_FRAME_HEIGHT], normal, -normal.dot(corner[longest]));
     for (int i = 0; i < 3; ++i) {
-        const int e = (longest + i) % 3; // the longest first: nothing of the inside is beyond its ends
-        if (flat && i > 0) {             // nowhere near, and everything outside of it
+        const int e = (longest + i) % 3; // the longest first: the inside lies between its ends
+        if (flat && i > 0) {             // an edge far away, with everything on its outer side
             frame.row[VSHI_FRAME_BESIDE + i][3] = 1.0f;
             frame.low[i] = frame.high[i] = 1e6f;
             continue;
@@ -86,7 +85,7 @@ double at(const float row[4], const Vec3d &q) {
     return double(row[0]) * q[0] + double(row[1]) * q[1] + double(row[2]) * q[2] + double(row[3]);
 }
 
-// Whether a point of the box around q may be within `reach` of the triangle; false only where none is.
+// Whether a point of the box around q may be within `reach` of the triangle. May return true if none is.
 bool may_reach(const vshi_frame &frame, const Vec3d &q, const Vec3d &half, double reach) {
     const auto extent = [&](const float row[4]) {
         return reach + SLACK + std::fabs(double(row[0])) * half[0] + std::fabs(double(row[1])) * half[1] +
@@ -107,8 +106,8 @@ struct Box {
     Cell first, last; // cells
 };
 
-// Cells of `edge` voxels that have a voxel's centre within `reach` of the corners' box; empty where last <
-// first. `shift` voxels after the cells' own.
+// Cells of `edge` voxels with a voxel's centre within `reach` of the corners' box, moved by `shift` voxels.
+// Empty if last < first.
 Box cells_of(const Corners &corner, double reach, int edge, double shift = 0.0) {
     Box box{};
     for (int axis = 0; axis < 3; ++axis) {
@@ -120,7 +119,7 @@ Box cells_of(const Corners &corner, double reach, int edge, double shift = 0.0) 
     return box;
 }
 
-// Calls use(cell) for the cells of the box that the triangle may reach, halving the box where it is large.
+// Calls use(cell) for the cells of the box that the triangle may reach. Halves large boxes.
 template <typename Use>
 void visit(const vshi_frame &frame, const Vec3d &origin, double reach, int edge, const Box &box,
            const Use &use) {
@@ -173,7 +172,7 @@ Band::Band(const Surface &surface_, double half_width_, Stage &stage)
         for (uint32_t half = 0; half < triangles_of(surface.polygons[i]); ++half) {
             const auto triangle = uint32_t(2 * i + half);
             visit_regions(corners_of(surface, triangle), half_width, [&](const Cell &cell) {
-                if (regions.empty() || !same(cell, last)) { // else as for the triangle before
+                if (regions.empty() || !same(cell, last)) { // else the region of the triangle before
                     const auto found = numbers.emplace(cell, regions.size());
                     if (found.second) {
                         regions.emplace_back();
@@ -188,7 +187,7 @@ Band::Band(const Surface &surface_, double half_width_, Stage &stage)
     }
 }
 
-// A region's leaves while they are measured. Places are counted from the region's middle.
+// Measures a region's leaves. Places are relative to the region's middle.
 class Band::Measuring {
   public:
     Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_)
@@ -202,9 +201,6 @@ class Band::Measuring {
             limit_leaves();
         }
         list_triangles();
-        const auto empty =
-            std::count_if(lists.begin(), lists.end(), [](const auto &list) { return list.empty(); });
-        region.distances.reserve((lists.size() - size_t(empty)) * VSHI_LEAF_VOXELS);
         for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
             measure_leaf(leaf, sides);
         }
@@ -232,7 +228,8 @@ class Band::Measuring {
         }
     }
 
-    // How far a leaf's middle may be from a triangle that is the nearest of one of its voxels.
+    // Finds the largest distance of a leaf's middle from a triangle that may be the nearest of one of its
+    // voxels.
     void limit_leaves() {
         for (const vshi_frame &frame : frames) {
             float distances[VSHI_REGION_LEAVES];
@@ -269,36 +266,36 @@ class Band::Measuring {
         }
     }
 
-    void measure_leaf(int leaf, bool sides) {
-        const std::vector<uint32_t> &triangles = lists[size_t(leaf)];
-        const Vec3d middle = middle_of(leaf);
+    void measure_leaf(int number, bool sides) {
+        const std::vector<uint32_t> &near = lists[size_t(number)];
+        const Vec3d middle = middle_of(number);
         const float place[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
-        float distances[VSHI_LEAF_VOXELS];
-        if (triangles.empty() || !kernel.measure(frames.data(), triangles.data(), triangles.size(), place,
-                                                 float(band.half_width), distances)) {
+        BandLeaf leaf;
+        leaf.distances.reset(near.empty() ? nullptr : new float[VSHI_LEAF_VOXELS]);
+        if (near.empty() || !kernel.measure(frames.data(), near.data(), near.size(), place,
+                                            float(band.half_width), leaf.distances.get())) {
             return;
         }
-        const Cell cell = cell_of(leaf);
-        region.leaves.push_back({region.origin[0] + LEAF * cell[0], region.origin[1] + LEAF * cell[1],
-                                 region.origin[2] + LEAF * cell[2]});
-        region.distances.insert(region.distances.end(), distances, distances + VSHI_LEAF_VOXELS);
-        if (sides && add_parts(distances, region.parts)) {
-            for (const uint32_t i : triangles) {
+        const Cell cell = cell_of(number);
+        for (int axis = 0; axis < 3; ++axis) {
+            leaf.origin[axis] = region.origin[axis] + LEAF * cell[axis];
+        }
+        if (sides && add_parts(leaf.distances.get(), leaf.parts)) {
+            for (const uint32_t i : near) {
                 if (may_reach(frames[i], middle, LEAF_HALF, PARTING)) {
-                    region.near_triangles.push_back(region.triangles[i]);
+                    leaf.triangles.push_back(region.triangles[i]);
                 }
             }
         }
-        region.part_ends.push_back(region.parts.size());
-        region.triangle_ends.push_back(region.near_triangles.size());
+        region.leaves.push_back(std::move(leaf));
     }
 
     const Band &band;
     Region &region;
     const vshi_leaf_kernel &kernel;
     std::vector<vshi_frame> frames;
-    std::vector<Box> boxes;                                      // of the leaves that each may reach
-    std::array<float, VSHI_REGION_LEAVES> limits;                // in wide bands
+    std::vector<Box> boxes;                                      // leaves that each triangle may reach
+    std::array<float, VSHI_REGION_LEAVES> limits;                // of limit_leaves(), for wide bands
     std::array<std::vector<uint32_t>, VSHI_REGION_LEAVES> lists; // frames, by leaf
 };
 
@@ -310,14 +307,7 @@ void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel) {
 std::vector<BandLeaf> Band::leaves() {
     std::vector<BandLeaf> all;
     for (Region &region : regions) {
-        size_t part = 0, triangle = 0;
-        for (size_t i = 0; i < region.leaves.size(); ++i) {
-            all.push_back({region.leaves[i], region.distances.data() + i * VSHI_LEAF_VOXELS,
-                           region.near_triangles.data() + triangle, region.triangle_ends[i] - triangle,
-                           region.parts.data() + part, region.part_ends[i] - part});
-            part = region.part_ends[i];
-            triangle = region.triangle_ends[i];
-        }
+        std::move(region.leaves.begin(), region.leaves.end(), std::back_inserter(all));
     }
     std::sort(all.begin(), all.end(),
               [](const BandLeaf &a, const BandLeaf &b) { return a.origin < b.origin; });

@@ -12,14 +12,14 @@ using openvdb::Vec3d;
 constexpr int LEAF = 8;
 // Pieces of triangles are not cut below this, voxels.
 constexpr double PIECE = 1.0;
-// Below this the cells of a triangle's box are looked at before it is cut, voxels.
+// Longest triangles whose box of cells is tested before they are cut, voxels.
 constexpr double GLANCE = 32.0;
-// How far a piece's middle may be from its triangle by rounding, voxels, and more.
+// Distance of a piece's middle from its triangle by rounding, voxels, with room.
 constexpr double MARGIN = 1e-5;
 using Piece = std::array<openvdb::Vec3s, 3>;
 
-// For each lattice cell of a leaf, named by its first voxel, whether one of the eight voxels at its corners
-// is outside: of a surface that bounds the outside there is one on either side.
+// For each lattice cell of a leaf, at its first voxel: whether one of the eight voxels at its corners is
+// outside. A surface that bounds the outside passes such cells only.
 Bits cells_near_outside(const LeafTable &table, const std::vector<Sides> &sides, size_t leaf) {
     const Bits *around[8];
     static const Bits none{};
@@ -28,7 +28,7 @@ Bits cells_near_outside(const LeafTable &table, const std::vector<Sides> &sides,
         around[n] = found == LeafTable::NONE ? &none : &sides[found].outside;
     }
     constexpr uint64_t last_z = 0x8080808080808080u;
-    // The voxels of a plane, with the next along z, then with the next along y.
+    // The voxels of a plane, joined with the next along z and along y.
     const auto plane = [&](int n, int x) {
         uint64_t rows[2];
         for (int y = 0; y < 2; ++y) {
@@ -54,7 +54,7 @@ class Cutting {
     Cutting(const LeafTable &table_, const std::vector<Bits> &near_, Stage &stage_, std::vector<Piece> &kept_)
         : table(table_), near(near_), stage(stage_), kept(kept_) {}
 
-    // Adds what bounds the outside of a triangle.
+    // Adds the parts of a triangle that bound the outside.
     void cut(const Corners &corner) {
         if (sort(corner) == Bounds::ALL) {
             add(corner);
@@ -66,7 +66,7 @@ class Cutting {
         kept.push_back({openvdb::Vec3s(corner[0]), openvdb::Vec3s(corner[1]), openvdb::Vec3s(corner[2])});
     }
 
-    // What of the triangle bounds the outside; that is added where it is some.
+    // Decides whether the triangle bounds the outside. If some of it does, adds that part.
     Bounds sort(const Corners &corner) {
         const double square[3] = {(corner[1] - corner[0]).lengthSqr(), (corner[2] - corner[1]).lengthSqr(),
                                   (corner[0] - corner[2]).lengthSqr()};
@@ -76,7 +76,7 @@ class Cutting {
             return is_near_outside(cell_of(middle)) ? Bounds::ALL : Bounds::NOTHING;
         }
         if (square[longest] >= GLANCE * GLANCE && stage.cancelled()) {
-            return Bounds::NOTHING; // of what is thrown away
+            return Bounds::NOTHING; // the result is thrown away
         }
         if (square[longest] < GLANCE * GLANCE) {
             const Bounds glanced = glance(corner);
@@ -100,7 +100,7 @@ class Cutting {
         return Bounds::SOME;
     }
 
-    // Sorts a triangle by the cells of its box, where these are all alike. That settles planes along two axes
+    // Decides by the cells of a triangle's box, if these are all alike. That settles axis-aligned planes
     // early.
     Bounds glance(const Corners &corner) {
         Cell low, high;
@@ -146,9 +146,9 @@ class Cutting {
 
     static Cell cell_of(const Vec3d &p) { return {floor_of(p[0]), floor_of(p[1]), floor_of(p[2])}; }
 
-    // NULL where there is no such leaf.
+    // Returns NULL if there is no such leaf.
     const Bits *near_of(const Cell &origin) {
-        if (!same(origin, last_origin)) { // else as before
+        if (!same(origin, last_origin)) {
             last_origin = origin;
             last = table.find(origin);
         }
@@ -166,7 +166,7 @@ class Cutting {
     const std::vector<Bits> &near;
     Stage &stage;
     std::vector<Piece> &kept;
-    Cell last_origin{1, 1, 1}; // none's
+    Cell last_origin{1, 1, 1}; // of no leaf
     uint32_t last = LeafTable::NONE;
 };
 
@@ -176,9 +176,10 @@ Surface boundary_of(const Surface &surface, const LeafTable &table, const std::v
                     double begin, double end, Stage &stage) {
     std::vector<uint8_t> in_doubt(surface.polygons.size());
     for (size_t i = 0; i < sides.size(); ++i) {
-        const BandLeaf &leaf = table.leaves[i];
-        for (size_t t = 0; any(sides[i].buried) && t < leaf.triangle_count; ++t) {
-            in_doubt[leaf.triangles[t] / 2] = 1;
+        if (any(sides[i].buried)) {
+            for (const uint32_t triangle : table.leaves[i].triangles) {
+                in_doubt[triangle / 2] = 1;
+            }
         }
     }
     std::vector<uint32_t> doubtful;
@@ -224,18 +225,11 @@ std::set<Cell> regions_near_buried(const LeafTable &table, const std::vector<Sid
         if (!any(sides[i].buried)) {
             continue;
         }
-        Cell low, high;
-        for (int axis = 0; axis < 3; ++axis) {
-            low[axis] = (table.leaves[i].origin[axis] - reach) & ~(Band::REGION - 1);
-            high[axis] = table.leaves[i].origin[axis] + LEAF - 1 + reach;
-        }
-        for (int32_t x = low[0]; x <= high[0]; x += Band::REGION) {
-            for (int32_t y = low[1]; y <= high[1]; y += Band::REGION) {
-                for (int32_t z = low[2]; z <= high[2]; z += Band::REGION) {
-                    near.insert({x, y, z});
-                }
-            }
-        }
+        const Coord origin(table.leaves[i].origin.data());
+        visit_blocks({origin.offsetBy(-reach), origin.offsetBy(LEAF - 1 + reach)}, Band::REGION,
+                     [&](const Coord &region) {
+                         near.insert({region[0], region[1], region[2]});
+                     });
     }
     return near;
 }

@@ -1,12 +1,12 @@
-/* OpenVDB is loaded when the first level set is made or read: loading it takes ten times as long as all other
- * libraries together (30 ms, 20 MB), and one of its own, liblog4cplus, begins threads in whoever loads it. */
+/* Loads OpenVDB when the first level set is made or read. Loading it takes ten times as long as all other
+ * libraries together (30 ms, 20 MB). One of its libraries, liblog4cplus, starts threads in the process. */
 #include "levelset/calls.h"
 #include "base/threads.h"
 #include "extern/module.h"
 
 static vshi_module module = VSHI_MODULE("level sets", "openvdb", 48 << 20, VSHI_OPENVDB_THREADS);
 
-static const vshi_openvdb_table *at(void) {
+static const vshi_openvdb_table *get_table(void) {
     return vshi_module_table(&module);
 }
 
@@ -16,7 +16,7 @@ static int *const nothing = NULL;
     vsh_result name parameters {                                                                             \
         const vsh_result result = vshi_module_load(&module, error);                                          \
         if (result == VSH_OK) {                                                                              \
-            return at()->name arguments;                                                                     \
+            return get_table()->name arguments;                                                              \
         }                                                                                                    \
         if ((none) != NULL) {                                                                                \
             *(none) = 0;                                                                                     \
@@ -25,12 +25,12 @@ static int *const nothing = NULL;
     }
 #define PASS_GIVE(result, name, parameters, arguments)                                                       \
     result name parameters {                                                                                 \
-        return at()->name arguments;                                                                         \
+        return get_table()->name arguments;                                                                  \
     }
 #define PASS_DO(name, parameters, arguments)                                                                 \
     void name parameters {                                                                                   \
-        if (at() != NULL) {                                                                                  \
-            at()->name arguments;                                                                            \
+        if (get_table() != NULL) {                                                                           \
+            get_table()->name arguments;                                                                     \
         }                                                                                                    \
     }
 

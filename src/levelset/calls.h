@@ -1,18 +1,18 @@
-/* The calls of the module of level sets, which is everything that is compiled against OpenVDB. This list
- * makes the members of the module's table, their values, and the library's functions that call them
+/* The functions of the module of level sets, which holds all code compiled against OpenVDB. This list
+ * generates the members of the module's table, their values, and the library's functions that call them
  * (calls.c).
  *
  * MAKE(name, parameters, arguments, none) returns a vsh_result and loads the module; its last parameter is
- * `vsh_error *error`. If the module cannot be loaded it sets what `none` points to, if not NULL, to 0.
- * GIVE(result, name, parameters, arguments) needs a handle that a MAKE made. DO(name, parameters, arguments)
- * returns nothing, and does nothing before the module is loaded: there is nothing to free. */
+ * `vsh_error *error`. If loading fails and `none` is not NULL, *none becomes 0. GIVE(result, name,
+ * parameters, arguments) needs a handle that a MAKE made. DO(name, parameters, arguments) returns nothing,
+ * and does nothing before the module is loaded. */
 #ifndef VSHI_LEVELSET_CALLS_H
 #define VSHI_LEVELSET_CALLS_H
 
 #include "levelset/access.h"
 
 #include <vdbshade/grid.h>
-#include <vdbshade/voxels.h>
+#include <vdbshade/volume.h>
 
 #ifdef __cplusplus
 extern "C" {
@@ -52,7 +52,7 @@ extern "C" {
          (const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity, size_t *count,      \
           vsh_error *error),                                                                                 \
          (path, run, entries, capacity, count, error), count)                                                \
-    MAKE(vsh_vdb_copy,                                                                                       \
+    MAKE(vshi_vdb_copy,                                                                                      \
          (const char *path, const char *name, const int32_t index_min[3], const int32_t size[3],             \
           const vsh_run *run, float *values, float *active, vsh_error *error),                               \
          (path, name, index_min, size, run, values, active, error), nothing)                                 \
@@ -93,7 +93,7 @@ extern "C" {
          (const vsh_volume *volume, size_t grid, const int32_t index_min[3], const int32_t size[3],          \
           float *values, vsh_error *error),                                                                  \
          (volume, grid, index_min, size, values, error), nothing)                                            \
-    MAKE(vsh_volume_sample,                                                                                  \
+    MAKE(vshi_volume_sample,                                                                                 \
          (const vsh_volume *volume, size_t grid, size_t count, const double *positions, float *values,       \
           vsh_error *error),                                                                                 \
          (volume, grid, count, positions, values, error), nothing)                                           \
@@ -119,7 +119,7 @@ extern "C" {
     DO(vsh_grid_get_info, (const vsh_grid *grid, vsh_grid_info *info), (grid, info))                         \
     DO(vsh_grid_free, (vsh_grid * grid), (grid))                                                             \
     DO(vsh_voxels_get_info, (const vsh_voxels *voxels, vsh_voxels_info *info), (voxels, info))               \
-    DO(vsh_voxels_centre, (const vsh_voxels *voxels, const int32_t index[3], double centre[3]),              \
+    DO(vshi_voxels_centre, (const vsh_voxels *voxels, const int32_t index[3], double centre[3]),             \
        (voxels, index, centre))                                                                              \
     DO(vsh_voxels_free, (vsh_voxels * voxels), (voxels))                                                     \
     DO(vsh_volume_get_info, (const vsh_volume *volume, vsh_volume_info *info), (volume, info))               \

@@ -17,16 +17,16 @@ namespace vshi {
 namespace {
 
 constexpr double SQRT3 = 1.7320508075688772;
-// From this many boxes on, their number at one level foretells the number of leaves: fewer are so large that
-// edges and corners count for too much.
-constexpr size_t FORETELLING_BOXES = 4096;
+// From this many boxes on, their number at one level predicts the number of leaves: in fewer and larger
+// boxes, edges and corners count for too much.
+constexpr size_t PREDICTING_BOXES = 4096;
 
 // A field's callback: for a position, or for several at once.
 struct Callback {
     const vsh_distance &field;
-    vsh_distances_fn *batch;       // in place of field.distance; nullptr: none
-    const vsh_sdf *tree;           // whose distance the field is; nullptr: any
-    const uint8_t *keep = nullptr; // of a tree's nodes, those that decide where it is asked; nullptr: all
+    vsh_distances_fn *batch;       // replaces field.distance; may be nullptr
+    const vsh_sdf *tree;           // the field's tree; nullptr: it has none
+    const uint8_t *keep = nullptr; // the tree's nodes that decide at the positions; nullptr: all
 
     double operator()(const Vec3d &position) const {
         double d = 0.0;
@@ -58,8 +58,8 @@ struct Level {
 
 class Voxelizer {
   public:
-    Voxelizer(const Callback &call_, const Lattice &lattice_, double band_, Stage &stage_, vsh_error *error_)
-        : call(call_), field(call_.field), lattice(lattice_), band(band_), stage(stage_), error(error_) {}
+    Voxelizer(const Callback &call_, const Lattice &lattice_, double band_, Stage &stage_)
+        : call(call_), field(call_.field), lattice(lattice_), band(band_), stage(stage_) {}
 
     FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high) {
         grid = FloatGrid::create(float(band));
@@ -67,20 +67,20 @@ class Voxelizer {
         Level level = start(low, high);
         while (level.size > 8) {
             level = split(level);
-            foretell(level);
+            check_leaves(level);
         }
         for (const Level &boxes : solid) {
             for (const Coord &origin : boxes.origins) {
                 fill_inside(origin, boxes.size);
             }
         }
-        leaves(level);
+        add_leaves(level);
         if (grid->tree().leafCount() == 0) {
-            throw Failure{
-                vshi_fail(error, VSH_ERROR_INPUT,
-                          "no surface in the box (%.9g, %.9g, %.9g) … (%.9g, %.9g, %.9g): the distance "
-                          "does not change sign at voxel size %g",
-                          low[0], low[1], low[2], high[0], high[1], high[2], lattice.voxel)};
+            refuse(
+                VSH_ERROR_INPUT,
+                "no surface in the box (%.9g, %.9g, %.9g) … (%.9g, %.9g, %.9g): the distance does not change "
+                "sign at voxel size %g",
+                low[0], low[1], low[2], high[0], high[1], high[2], lattice.voxel);
         }
         return grid;
     }
@@ -89,11 +89,11 @@ class Voxelizer {
     Vec3d position(const Vec3d &index) const { return index * lattice.voxel + lattice.translation; }
     double distance(const Vec3d &index) const { return call(position(index)); }
 
-    // How far the field may lie from its value at the middle of a box of `size` voxels an edge, at its
-    // voxels.
+    // The most by which the field at a voxel of a box differs from its value at the box's middle. The box has
+    // an edge of `size` voxels.
     double slack(int32_t size) const { return field.lipschitz * 0.5 * SQRT3 * (size - 1) * lattice.voxel; }
 
-    // Boxes are handled by many threads; the lowest number wins, so that the message does not depend on them.
+    // The lowest number wins, so that the message does not depend on threads.
     void note_bad(size_t index) {
         size_t first = bad.load();
         while (index < first && !bad.compare_exchange_weak(first, index)) {
@@ -102,9 +102,8 @@ class Voxelizer {
 
     [[noreturn]] void fail_bad(const Vec3d &index) const {
         const Vec3d p = position(index);
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
-                                "distance callback: %g at (%.9g, %.9g, %.9g): expected a finite value",
-                                distance(index), p[0], p[1], p[2])};
+        refuse(VSH_ERROR_INPUT, "distance callback: %g at (%.9g, %.9g, %.9g): expected a finite value",
+               distance(index), p[0], p[1], p[2]);
     }
 
     Level start(const Vec3d &low, const Vec3d &high) {
@@ -117,27 +116,19 @@ class Voxelizer {
         while (level.size < region.dim()[region.maxExtent()] / 4) {
             level.size *= 2;
         }
-        const int32_t mask = ~(level.size - 1);
-        const Coord begin = region.min() & mask;
-        for (int32_t x = begin[0]; x <= region.max()[0]; x += level.size) {
-            for (int32_t y = begin[1]; y <= region.max()[1]; y += level.size) {
-                for (int32_t z = begin[2]; z <= region.max()[2]; z += level.size) {
-                    level.origins.emplace_back(x, y, z);
-                }
-            }
-        }
+        visit_blocks(region, level.size, [&](const Coord &origin) { level.origins.push_back(origin); });
         return level;
     }
 
-    // By the coarsest tiles that fit.
+    // Uses the coarsest tiles that fit.
     void fill_inside(const Coord &origin, int32_t size) {
         grid->tree().sparseFill(openvdb::CoordBBox::createCube(origin, size), -grid->background(), false);
     }
 
-    // The boxes are the children of those that slack() and the band leave on either side of the surface.
-    // Leaves are kept by their own voxels.
-    void foretell(const Level &level) const {
-        if (level.size > 8 && level.origins.size() < FORETELLING_BOXES) {
+    // Predicts the leaves from the boxes of a level, and checks the memory for them. The boxes are children
+    // of boxes within slack() and the band of the surface. Leaves have voxels within the band.
+    void check_leaves(const Level &level) const {
+        if (level.size > 8 && level.origins.size() < PREDICTING_BOXES) {
             return;
         }
         const double edge = level.size;
@@ -146,9 +137,9 @@ class Voxelizer {
         const double area = double(level.origins.size()) * edge * edge * edge / reach;
         const double leaves = area * (SQRT3 * 8.0 + width) / double(Leaf::SIZE);
         if (field.exact) {
-            check_memory(&stage.options, lattice.voxel, leaves, leaves * BYTES_PER_LEAF, error);
+            check_memory(stage.options, lattice.voxel, leaves, leaves * BYTES_PER_LEAF);
         } else {
-            check_redistance(stage.options, lattice, area, sides, leaves, 0.0, error);
+            check_redistance(stage.options, lattice, area, sides, leaves, 0.0);
         }
     }
 
@@ -160,8 +151,7 @@ class Voxelizer {
         }
         const double boxes = double(std::count(signs.begin(), signs.end(), int8_t(-1)));
         const double tiles = boxes * std::pow(level.size / TILE, 3.0);
-        check_memory(&stage.options, lattice.voxel, tiles * std::pow(TILE / 8.0, 3.0), tiles * BYTES_PER_TILE,
-                     error);
+        check_memory(stage.options, lattice.voxel, tiles * std::pow(TILE / 8.0, 3.0), tiles * BYTES_PER_TILE);
     }
 
     Level split(const Level &level) {
@@ -198,7 +188,7 @@ class Voxelizer {
         return next;
     }
 
-    // Of the shapes of a tree, those that decide in a leaf.
+    // The tree's shapes that decide in a leaf.
     std::vector<uint8_t> narrow(const Coord &origin) const {
         constexpr double MARGIN = 1.0 + 1e-6; // for the rounding of positions
         std::vector<uint8_t> keep;
@@ -210,9 +200,9 @@ class Voxelizer {
         return keep;
     }
 
-    // Samples a leaf by blocks of 4³ voxels: of those that the band cannot reach, only the middles. nullptr
-    // where no voxel is in the band; `sign` then tells the side.
-    Leaf *leaf(const Coord &origin, int8_t &sign, size_t index) {
+    // Samples a leaf by blocks of 4³ voxels. Blocks that the band cannot reach are sampled at their middles
+    // only. Returns nullptr if no voxel is in the band; `sign` is then the leaf's side.
+    Leaf *sample_leaf(const Coord &origin, int8_t &sign, size_t index) {
         const std::vector<uint8_t> keep = narrow(origin);
         const Callback here{call.field, call.batch, call.tree, keep.empty() ? nullptr : keep.data()};
         const float background = grid->background();
@@ -260,8 +250,8 @@ class Voxelizer {
             }
             (last < 0.0f ? inside : outside) = true;
         }
-        // Both signs without a voxel in the band: a field that keeps no distance near its surface. Kept: the
-        // re-distancing, or the field's reader, must see where it changes sign.
+        // A leaf of both signs without a voxel in the band comes from a field that is no distance near its
+        // surface. Re-distancing, or the field's reader, must see its change of sign.
         if (in_band || (inside && outside)) {
             return leaf.release();
         }
@@ -269,13 +259,13 @@ class Voxelizer {
         return nullptr;
     }
 
-    void leaves(const Level &level) {
+    void add_leaves(const Level &level) {
         const size_t count = level.origins.size();
         std::vector<std::unique_ptr<Leaf>> made(count);
         std::vector<int8_t> signs(count);
         stage.loop(count, 16, 0.0, field.exact ? 1.0 : 0.5, [&](size_t i) {
             if (i < bad.load()) {
-                made[i].reset(leaf(level.origins[i], signs[i], i));
+                made[i].reset(sample_leaf(level.origins[i], signs[i], i));
             }
         });
         if (bad != SIZE_MAX) {
@@ -285,8 +275,7 @@ class Voxelizer {
                     fail_bad(index);
                 }
             }
-            throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
-                                    "distance callback: a value that is not finite between voxels")};
+            refuse(VSH_ERROR_INPUT, "distance callback: a value that is not finite between voxels");
         }
         for (size_t i = 0; i < count; ++i) {
             if (made[i] != nullptr) {
@@ -302,65 +291,57 @@ class Voxelizer {
     const Lattice &lattice;
     const double band; // world units of the field's value
     Stage &stage;
-    vsh_error *error;
     openvdb::CoordBBox region;
     Vec3d sides;              // of the bounds, voxels
-    std::vector<Level> solid; // boxes that are inside: filled once no level is refused any more
+    std::vector<Level> solid; // boxes inside: filled once all levels have passed the memory check
     FloatGrid::Ptr grid;
     std::atomic<size_t> bad{SIZE_MAX}; // first box with a value that is not finite
     static constexpr int32_t BLOCK = 4;
 };
 
-void check_field(const vsh_distance *field, vsh_distances_fn *batch, vsh_error *error) {
+void check_field(const vsh_distance *field, vsh_distances_fn *batch) {
     if (field == nullptr || (field->distance == nullptr && batch == nullptr)) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "distance field: no callback")};
+        refuse(VSH_ERROR_ARGUMENT, "distance field: no callback");
     }
     if (!(field->lipschitz > 0.0 && std::isfinite(field->lipschitz))) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                "distance field: lipschitz %g: expected more than 0", field->lipschitz)};
+        refuse(VSH_ERROR_ARGUMENT, "distance field: lipschitz %g: expected more than 0", field->lipschitz);
     }
     for (int i = 0; i < 3; ++i) {
-        const double low = field->bounds_min[i];
-        const double high = field->bounds_max[i];
+        const double low = field->bounds_min[i], high = field->bounds_max[i];
         if (!(std::isfinite(low) && std::isfinite(high) && low <= high && std::isfinite(high - low))) {
-            throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                    "distance field: bounds[%d] %g … %g: expected finite, the lower first", i,
-                                    low, high)};
+            refuse(VSH_ERROR_ARGUMENT, "distance field: bounds[%d] %g … %g: expected finite, the lower first",
+                   i, low, high);
         }
     }
 }
 
+// The body of all public calls. `batch` and `tree` may be NULL.
 vsh_result from_distance(const vsh_distance *field, vsh_distances_fn *batch, const vsh_sdf *tree,
-                         const vsh_grid_options *options, const vsh_run *given, vsh_grid **grid,
+                         const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                          vsh_error *error) {
-    vsh_run run;
-    const vsh_result result = vshi_run_resolve(given, &run, error);
-    if (result != VSH_OK) {
-        return result;
-    }
-    check_field(field, batch, error);
-    const Callback call{*field, batch, tree};
-    const Vec3d low(field->bounds_min);
-    const Vec3d high(field->bounds_max);
-    const Lattice lattice = make_lattice(options, low, high, error);
-    Stage stage(run, "voxelize", error);
-    // A field to be re-distanced is needed only where cells of 2³ voxels may hold its zero.
-    const double band =
-        field->exact ? lattice.half_width * lattice.voxel : 1.01 * SQRT3 * field->lipschitz * lattice.voxel;
-    FloatGrid::Ptr level_set = Voxelizer(call, lattice, band, stage, error).run(low, high);
-    if (!field->exact) {
-        const double unit = 1.0 / (field->lipschitz * lattice.voxel);
-        const IndexDistance exact = [&](const Vec3d &index) {
-            return unit * call(index * lattice.voxel + lattice.translation);
-        };
-        level_set = redistance(*level_set, exact, lattice, 0.5, 1.0, stage, error);
-    }
-    *grid = close_grid(level_set, 0.0, stage);
-    return VSH_OK;
+    return guard_run(run, error, VSH_ERROR_INTERNAL, "voxelize", [&](const vsh_run &full) {
+        check_field(field, batch);
+        const Callback call{*field, batch, tree};
+        const Vec3d low(field->bounds_min), high(field->bounds_max);
+        const Lattice lattice = make_lattice(options, low, high);
+        Stage stage(full, "voxelize");
+        // A field to be re-distanced is needed only where cells of 2³ voxels may hold its zero.
+        const double band = field->exact ? lattice.half_width * lattice.voxel
+                                         : 1.01 * SQRT3 * field->lipschitz * lattice.voxel;
+        FloatGrid::Ptr level_set = Voxelizer(call, lattice, band, stage).run(low, high);
+        if (!field->exact) {
+            const double unit = 1.0 / (field->lipschitz * lattice.voxel);
+            const IndexDistance exact = [&](const Vec3d &index) {
+                return unit * call(index * lattice.voxel + lattice.translation);
+            };
+            level_set = redistance(*level_set, exact, lattice, 0.5, 1.0, stage);
+        }
+        *grid = close_grid(level_set, 0.0, stage);
+    });
 }
 
 double tree_distance(void *user, const double position[3]) {
-    return vsh_sdf_distance(static_cast<const vsh_sdf *>(user), position);
+    return vshi_sdf_distance(static_cast<const vsh_sdf *>(user), position);
 }
 
 } // namespace
@@ -371,9 +352,7 @@ vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_opti
                                   const vsh_run *run, vsh_grid **grid, vsh_error *error) {
     VSHI_NEEDS(grid);
     *grid = nullptr;
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize", [&] {
-        return vshi::from_distance(field, nullptr, nullptr, options, run, grid, error);
-    });
+    return vshi::from_distance(field, nullptr, nullptr, options, run, grid, error);
 }
 
 vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *distances,
@@ -382,9 +361,7 @@ vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *
     VSHI_NEEDS(grid);
     *grid = nullptr;
     VSHI_NEEDS(distances);
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize", [&] {
-        return vshi::from_distance(field, distances, nullptr, options, run, grid, error);
-    });
+    return vshi::from_distance(field, distances, nullptr, options, run, grid, error);
 }
 
 vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
@@ -392,13 +369,9 @@ vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options
     VSHI_FLOATS;
     VSHI_NEEDS(grid);
     *grid = nullptr;
-    const vsh_result result = vsh_sdf_check(sdf, error);
-    if (result != VSH_OK) {
-        return result;
-    }
+    VSHI_TRY(vshi_sdf_check(sdf, error));
     vsh_sdf tree = *sdf;
     vsh_distance field = {vshi::tree_distance, &tree, 1.0, vshi_sdf_exact(sdf), {0, 0, 0}, {0, 0, 0}};
-    vsh_sdf_bounds(sdf, field.bounds_min, field.bounds_max);
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
-                       [&] { return vshi::from_distance(&field, nullptr, sdf, options, run, grid, error); });
+    vshi_sdf_bounds(sdf, field.bounds_min, field.bounds_max);
+    return vshi::from_distance(&field, nullptr, sdf, options, run, grid, error);
 }

@@ -1,6 +1,6 @@
-// Grids from outside call themselves level sets whether they hold distances or not (filtered, scaled and
-// advected ones do not), so their values are looked at: whether they change by a voxel's size from voxel to
-// voxel at the surface, and reach the background where the band ends.
+// Examines grids from outside. They call themselves level sets whether they hold distances or not (filtered,
+// scaled and advected ones do not). Distances change by a voxel's size from voxel to voxel at the surface,
+// and reach the background where the band ends.
 #include "levelset/file.h"
 
 #include "base/elementary.h"
@@ -20,11 +20,12 @@ namespace {
 constexpr double UNEVEN = 1e-4;
 constexpr double SMALLEST_READ = 1e-5;   // voxel size, world units; OpenVDB writes no smaller ones
 constexpr double NARROWEST = 3.0 - 1e-3; // half width, voxels; background is a float
-constexpr double LEAST_NORM = 0.8, GREATEST_NORM = 1.2; // of a distance's gradient, on a lattice
-constexpr float PLATEAU = 1.0f - 1e-4f; // of the background: an inactive value below was meant to differ
-constexpr float BEYOND = 1.0f + 1e-3f;  // of the background: a half-float's rounding is below
+constexpr double LEAST_NORM = 0.8, GREATEST_NORM = 1.2; // norm of a distance's gradient on a lattice
+constexpr float PLATEAU = 1.0f - 1e-4f; // share of the background: a smaller inactive value is no background
+constexpr float BEYOND = 1.0f + 1e-3f;  // share of the background: a half-float's rounding is below
 constexpr float CLIFF = 1.5f;           // voxels from a voxel to the next, where a distance changes by 1
-constexpr float JUMP = 2.5f;            // the same, of damage: sheets thinner than a voxel make up to 1.9
+constexpr float JUMP = 2.5f;            // the same where damaged: sheets thinner than a voxel make up to 1.9
+constexpr int STRIDES[3] = {64, 8, 1};  // of a leaf's values
 constexpr double CLIFF_SHARE = 0.1;     // of the band's rim; conversions of meshes leave some
 
 Finding finding(Finding::Kind kind, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -98,7 +99,7 @@ double voxel_size(const openvdb::GridBase &grid) {
 
 namespace {
 
-// What one leaf shows, and all of them.
+// Counts of one leaf, or of all.
 struct Census {
     size_t negative = 0, positive = 0;
     size_t flat = 0, steep = 0, norms = 0; // norms of gradients below, above, and all
@@ -122,18 +123,17 @@ struct Census {
     }
 };
 
-// Two norms of a gradient. `towards` takes differences towards the surface (Godunov's scheme for the Eikonal
-// equation, Rouy and Tourin 1992): central ones vanish in the middle of thin sheets. `steepest` takes the
-// larger of both differences: across a sheet thinner than two voxels those towards the surface are small too.
+// Two norms of a gradient. `towards` uses differences towards the surface (Godunov's scheme for the Eikonal
+// equation, Rouy and Tourin 1992): central differences vanish in the middle of thin sheets. `steepest` uses
+// the larger of both differences: across a sheet thinner than two voxels the others are small too.
 struct Norms {
     double towards, steepest;
 };
 
 Norms find_norms(const float *value, double voxel) {
-    constexpr int strides[3] = {64, 8, 1};
     const double sign = *value < 0.0f ? -1.0 : 1.0;
     double towards = 0.0, steepest = 0.0;
-    for (const int stride : strides) {
+    for (const int stride : STRIDES) {
         const double back = sign * (double(*value) - double(value[-stride])) / voxel;
         const double ahead = sign * (double(*value) - double(value[stride])) / voxel;
         const double slope = std::max(0.0, std::max(back, ahead));
@@ -144,21 +144,20 @@ Norms find_norms(const float *value, double voxel) {
     return {std::sqrt(towards), std::sqrt(steepest)};
 }
 
-// Whether no distance changes so from a voxel to the next: too far, or from deep inside to the outside.
+// Whether two neighbours differ more than distances can: by too much, or from deep inside to the outside.
 bool is_jump(float a, float b, float background, float voxel) {
     const bool in_a = std::fabs(a) < background, in_b = std::fabs(b) < background;
     if (in_a && in_b) {
         return std::fabs(a - b) > JUMP * voxel;
     }
-    // a background stands for what is beyond the band
+    // a background means any distance beyond the band
     return std::signbit(a) != std::signbit(b) &&
            ((!in_a && !in_b) || std::fabs(in_a ? a : b) > (JUMP - 1.0f) * voxel);
 }
 
-void visit_pairs(Census &census, const Leaf &leaf, openvdb::Index i, float background, float voxel) {
+void count_pairs(Census &census, const Leaf &leaf, openvdb::Index i, float background, float voxel) {
     const float *values = leaf.buffer().data();
-    constexpr openvdb::Index strides[3] = {64, 8, 1};
-    for (const openvdb::Index stride : strides) {
+    for (const openvdb::Index stride : STRIDES) {
         if ((i / stride) % 8 == 7) {
             continue;
         }
@@ -175,9 +174,9 @@ void visit_pairs(Census &census, const Leaf &leaf, openvdb::Index i, float backg
     }
 }
 
-// Jumps to what is beside the leaf: each leaf looks ahead, and back where there is a tile.
-size_t jumps_beside(const Leaf &leaf, const FloatTree &tree, float background, float voxel) {
-    constexpr openvdb::Index strides[3] = {64, 8, 1};
+// Counts jumps across the leaf's faces. Each leaf compares with its next neighbours, and with earlier ones
+// that are tiles.
+size_t count_jumps_beside(const Leaf &leaf, const FloatTree &tree, float background, float voxel) {
     size_t jumps = 0;
     for (int side = 0; side < 6; ++side) {
         const int axis = side / 2;
@@ -186,10 +185,10 @@ size_t jumps_beside(const Leaf &leaf, const FloatTree &tree, float background, f
         at[axis] += ahead ? 8 : -1;
         const Leaf *beside = tree.probeConstLeaf(at);
         if (beside != nullptr && !ahead) {
-            continue; // it looks this way
+            continue; // it compares with this leaf itself
         }
         const float tile = beside == nullptr ? tree.getValue(at) : 0.0f;
-        const openvdb::Index stride = strides[axis], u = strides[(axis + 1) % 3], v = strides[(axis + 2) % 3];
+        const openvdb::Index stride = STRIDES[axis], u = STRIDES[(axis + 1) % 3], v = STRIDES[(axis + 2) % 3];
         for (openvdb::Index k = 0; k < 64; ++k) {
             const openvdb::Index first = k / 8 * u + k % 8 * v;
             const float value = leaf.buffer().data()[first + (ahead ? 7 * stride : 0)];
@@ -200,7 +199,7 @@ size_t jumps_beside(const Leaf &leaf, const FloatTree &tree, float background, f
     return jumps;
 }
 
-Census visit(const Leaf &leaf, float background, float voxel) {
+Census count_leaf(const Leaf &leaf, float background, float voxel) {
     Census census;
     const float *values = leaf.buffer().data();
     for (openvdb::Index i = 0; i < Leaf::SIZE; ++i) {
@@ -213,7 +212,7 @@ Census visit(const Leaf &leaf, float background, float voxel) {
         census.positive += value > 0.0f;
         census.outer += !leaf.isValueOn(i) && std::fabs(value) > BEYOND * background;
         census.plateaus += !leaf.isValueOn(i) && std::fabs(value) < PLATEAU * background;
-        visit_pairs(census, leaf, i, background, voxel);
+        count_pairs(census, leaf, i, background, voxel);
         const Coord at = Leaf::offsetToLocalCoord(i);
         const bool surrounded = std::min({at[0], at[1], at[2]}) > 0 && std::max({at[0], at[1], at[2]}) < 7;
         if (surrounded && std::fabs(value) < voxel) {
@@ -300,8 +299,8 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
     }
     std::vector<Census> each(leaves.size());
     stage.loop(leaves.size(), 64, 0.3, 0.5, [&](size_t i) {
-        each[i] = visit(*leaves[i], background, float(voxel));
-        each[i].jumps += jumps_beside(*leaves[i], grid.tree(), background, float(voxel));
+        each[i] = count_leaf(*leaves[i], background, float(voxel));
+        each[i].jumps += count_jumps_beside(*leaves[i], grid.tree(), background, float(voxel));
     });
     Census all;
     for (size_t i = 0; i < each.size(); ++i) {
@@ -350,23 +349,26 @@ Finding examine_values(const FloatGrid &grid, Stage &stage) {
     return {};
 }
 
+namespace {
+
 // Area of a surface, voxel², for each voxel that has a neighbour on the other side: a plane of normal n has
-// 2 max |n_i| of them a voxel², 1.66 over all directions.
+// 2 max |n_i| such voxels a voxel², 1.66 over all directions.
 constexpr double AREA_PER_VOXEL = 0.6;
 
-constexpr double COPIES = 6.0; // of far inner nodes that are there at a time
+constexpr double COPIES = 6.0; // of far inner nodes that exist at a time
 
-FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
+// True distances for an ODD grid: the same surface, signs and transform, and a band of 3 voxels or more. Its
+// errors do not name the file.
+FloatGrid::Ptr compute_distances(const FloatGrid &grid, Stage &stage) {
     const double voxel = voxel_size(grid);
     const double half_width = std::clamp(std::round(double(grid.background()) / voxel), 3.0, 100.0);
-    // In index space the lattice stands where it likes; the transform is the source's in the end.
+    // Work is in index space; at the end the grid gets the source's transform.
     const Lattice lattice{voxel, half_width, 0.0, Vec3d(0.0)};
     const double count = double(grid.tree().leafCount());
-    check_memory(&stage.options, voxel, count,
-                 2.0 * count * BYTES_PER_LEAF + COPIES * far_node_bytes(double(grid.memUsage()), count),
-                 error);
+    check_memory(stage.options, voxel, count,
+                 2.0 * count * BYTES_PER_LEAF + COPIES * far_node_bytes(double(grid.memUsage()), count));
 
-    // Meshing looks at active voxels only: those of all cells that hold both signs.
+    // Meshing uses active voxels only: those of all cells that hold both signs.
     const FloatGrid::Ptr source = grid.deepCopy();
     std::vector<Leaf *> leaves;
     source->tree().getNodes(leaves);
@@ -389,14 +391,45 @@ FloatGrid::Ptr mend(const FloatGrid &grid, Stage &stage, vsh_error *error) {
         crossings += found;
     });
     check_redistance(stage.options, lattice, AREA_PER_VOXEL * double(crossings.load()),
-                     source->evalActiveVoxelDim().asVec3d(), count, count * BYTES_PER_LEAF, error);
+                     source->evalActiveVoxelDim().asVec3d(), count, count * BYTES_PER_LEAF);
     stage.run([&] {
         openvdb::tools::dilateActiveValues(source->tree(), 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                            openvdb::tools::PRESERVE_TILES);
     });
-    const FloatGrid::Ptr mended = redistance(*source, {}, lattice, 0.6, 1.0, stage, error);
+    const FloatGrid::Ptr mended = redistance(*source, {}, lattice, 0.6, 1.0, stage);
     mended->setTransform(grid.transform().copy());
     return mended;
+}
+
+} // namespace
+
+void refuse_bad(const GridName &name, const Finding &finding) {
+    if (finding.kind == Finding::BAD) {
+        refuse(VSH_ERROR_INPUT, "%s cannot cast shadows: %s", name.text().c_str(), finding.text.c_str());
+    }
+}
+
+vsh_grid *close_level_set(LevelSet &set, Stage &stage) {
+    const std::string name = set.name.text();
+    stage.check();
+    check_bytes(stage.options, double(set.grid->memUsage()), name.c_str());
+    const Finding finding = examine_values(*set.grid, stage);
+    refuse_bad(set.name, finding);
+    if (finding.kind == Finding::NOTED) {
+        vshi_warn(&stage.options, "%s: %s", name.c_str(), finding.text.c_str());
+    }
+    if (finding.kind == Finding::ODD) {
+        vshi_warn(&stage.options, "%s: %s: its distances were made anew", name.c_str(), finding.text.c_str());
+        try {
+            set.grid = compute_distances(*set.grid, stage);
+        } catch (const Failure &failure) {
+            if (failure.error.code != VSH_ERROR_CANCELLED) {
+                refuse(failure.error.code, "%s: %.700s", name.c_str(), failure.error.message);
+            }
+            throw;
+        }
+    }
+    return close_grid(set.grid, set.shell, stage);
 }
 
 } // namespace vshi

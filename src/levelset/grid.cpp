@@ -1,11 +1,11 @@
-// The handle of a level set: making it, what it tells, what the field reads of it, and the caller's own
-// OpenVDB grids.
+// The handle of a level set: making it, its facts, its leaves for the field, and OpenVDB grids of callers.
 #include "levelset/grid.h"
 
 #include "base/parallel.h"
 #include "levelset/file.h"
 
 #include <cmath>
+#include <cstdarg>
 #include <cstdio>
 #include <memory>
 #include <openvdb/tools/Dense.h>
@@ -19,29 +19,36 @@ template class openvdb::Grid<openvdb::FloatTree>;
 
 namespace vshi {
 
-namespace {
-
-void fail_option(vsh_error *error, const char *name, double value, const char *expected) {
-    throw Failure{
-        vshi_fail(error, VSH_ERROR_ARGUMENT, "grid options: %s %g: expected %s", name, value, expected)};
+void refuse(vsh_result code, const char *format, ...) {
+    Failure failure;
+    char text[1 << 14]; // vshi_fail() shortens it in the middle
+    va_list values;
+    va_start(values, format);
+    std::vsnprintf(text, sizeof text, format, values);
+    va_end(values);
+    vshi_fail(&failure.error, code, "%s", text);
+    throw failure;
 }
 
-vsh_grid_options resolve(const vsh_grid_options *given, vsh_error *error) {
-    vsh_grid_options options = vsh_grid_options_default();
-    require(vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error));
-    if (!(options.voxel_size >= 0.0 && std::isfinite(options.voxel_size))) {
-        fail_option(error, "voxel_size", options.voxel_size, "more than 0, or 0 for one from the resolution");
+namespace {
+
+void check_option(bool good, const char *name, double value, const char *expected) {
+    if (!good) {
+        refuse(VSH_ERROR_ARGUMENT, "grid options: %s %g: expected %s", name, value, expected);
     }
-    if (options.voxel_size == 0.0 && (options.resolution < 2 || options.resolution > 65536)) {
-        fail_option(error, "resolution", options.resolution, "2 … 65536");
-    }
-    if (!(options.half_width >= 3.0 && options.half_width <= 100.0)) {
-        fail_option(error, "half_width", options.half_width, "3 … 100 voxels");
-    }
-    if (!(options.shell_thickness >= 1.0 && options.shell_thickness <= 50.0)) {
-        fail_option(error, "shell_thickness", options.shell_thickness, "1 … 50 voxels");
-    }
-    return options;
+}
+
+vsh_grid_options resolve(const vsh_grid_options *given) {
+    vsh_grid_options o = vsh_grid_options_default();
+    require(vshi_options_resolve, given, &o, sizeof o, "vsh_grid_options");
+    check_option(o.voxel_size >= 0.0 && std::isfinite(o.voxel_size), "voxel_size", o.voxel_size,
+                 "more than 0, or 0 for one from the resolution");
+    check_option(o.voxel_size != 0.0 || (o.resolution >= 2 && o.resolution <= 65536), "resolution",
+                 o.resolution, "2 … 65536");
+    check_option(o.half_width >= 3.0 && o.half_width <= 100.0, "half_width", o.half_width, "3 … 100 voxels");
+    check_option(o.shell_thickness >= 1.0 && o.shell_thickness <= 50.0, "shell_thickness", o.shell_thickness,
+                 "1 … 50 voxels");
+    return o;
 }
 
 } // namespace
@@ -53,37 +60,33 @@ openvdb::math::Transform::Ptr Lattice::transform() const {
                               {translation[0], translation[1], translation[2], voxel, voxel, voxel}});
 }
 
-Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3d &high, vsh_error *error) {
-    const vsh_grid_options options = resolve(given, error);
+Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3d &high) {
+    const vsh_grid_options options = resolve(given);
     const Vec3d size = high - low;
     const double longest = std::max(size[0], std::max(size[1], size[2]));
     Lattice lattice{options.voxel_size, options.half_width, options.shell_thickness, Vec3d(0.0)};
     if (lattice.voxel == 0.0) {
         if (!(longest > 0.0)) {
-            throw Failure{vshi_fail(error, VSH_ERROR_INPUT,
-                                    "the casters' box has no size: no voxel size follows from resolution %d",
-                                    options.resolution)};
+            refuse(VSH_ERROR_INPUT, "the casters' box has no size: no voxel size follows from resolution %d",
+                   options.resolution);
         }
         lattice.voxel = longest / options.resolution;
     }
     if (!(0.5 * longest / lattice.voxel + lattice.half_width + lattice.shell < double(LARGEST_INDEX))) {
-        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
-                                "voxel size %g: %g voxels along the longest side, %g at most", lattice.voxel,
-                                longest / lattice.voxel, 2.0 * double(LARGEST_INDEX))};
+        refuse(VSH_ERROR_LIMIT, "voxel size %g: %g voxels along the longest side, %g at most", lattice.voxel,
+               longest / lattice.voxel, 2.0 * double(LARGEST_INDEX));
     }
     if (!(lattice.voxel >= SMALLEST_VOXEL && lattice.voxel <= LARGEST_VOXEL)) {
-        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
-                                "voxel size %g: distances are kept for %g … %g; scale the scene",
-                                lattice.voxel, SMALLEST_VOXEL, LARGEST_VOXEL)};
+        refuse(VSH_ERROR_LIMIT, "voxel size %g: distances are kept for %g … %g; scale the scene",
+               lattice.voxel, SMALLEST_VOXEL, LARGEST_VOXEL);
     }
     for (int i = 0; i < 3; ++i) {
         const double centre = low[i] + 0.5 * size[i];
         lattice.translation[i] = lattice.voxel * std::round(centre / lattice.voxel);
         // A voxel must be many steps of a double there, or positions would fall together.
         if (!(std::fabs(lattice.translation[i]) / lattice.voxel < 1e12)) {
-            throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
-                                    "voxel size %g: %g voxels from the origin, 1e12 at most", lattice.voxel,
-                                    std::fabs(centre / lattice.voxel))};
+            refuse(VSH_ERROR_LIMIT, "voxel size %g: %g voxels from the origin, 1e12 at most", lattice.voxel,
+                   std::fabs(centre / lattice.voxel));
         }
     }
     return lattice;
@@ -98,25 +101,23 @@ double band_leaves(double area, const Vec3d &sides, double half_width) {
     return std::min(area * (2.0 * b + 12.0) + around, most) / double(Leaf::SIZE);
 }
 
-vsh_result check_bytes(const vsh_run *run, double bytes, const char *what, vsh_error *error) {
-    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
+void check_bytes(const vsh_run &run, double bytes, const char *what) {
+    require(vshi_check_limit, &run, bytes, what);
     const double machine = double(sysconf(_SC_PHYS_PAGES)) * double(sysconf(_SC_PAGE_SIZE));
     if (machine > 0.0 && bytes > machine) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: about %.0f MB are needed, over this machine's memory of %.0f MB", what,
-                         bytes / 1e6, machine / 1e6);
+        refuse(VSH_ERROR_LIMIT, "%s: about %.0f MB are needed, over this machine's memory of %.0f MB", what,
+               bytes / 1e6, machine / 1e6);
     }
-    return VSH_OK;
 }
 
-void check_memory(const vsh_run *run, double voxel, double leaves, double bytes, vsh_error *error) {
+void check_memory(const vsh_run &run, double voxel, double leaves, double bytes) {
     char what[128];
     std::snprintf(what, sizeof what, "voxel size %g (about %.3g voxels)", voxel, leaves * double(Leaf::SIZE));
-    require(check_bytes(run, bytes, what, error));
+    check_bytes(run, bytes, what);
 }
 
-// Of an arena. TBB prints a warning where one asks for more threads than the machine has cores.
-static int slots(const vshi_job *job) {
+// Threads of an arena. TBB prints a warning if an arena has more than the machine has cores.
+static int count_slots(const vshi_job *job) {
     if (job == nullptr) {
         throw std::bad_alloc();
     }
@@ -125,8 +126,8 @@ static int slots(const vshi_job *job) {
     return threads > 0 ? std::min(threads, tbb::info::default_concurrency()) : tbb::task_arena::automatic;
 }
 
-Stage::Stage(const vsh_run &run, const char *name, vsh_error *error_)
-    : options(run), job(vshi_job_begin(&run, name, UNITS)), error(error_), arena(slots(job)) {}
+Stage::Stage(const vsh_run &run, const char *name)
+    : options(run), job(vshi_job_begin(&run, name, UNITS)), arena(count_slots(job)) {}
 
 void Stage::reach(double fraction) {
     const size_t target = size_t(std::clamp(fraction, 0.0, 1.0) * double(UNITS));
@@ -138,7 +139,7 @@ void Stage::reach(double fraction) {
 
 void Stage::check() {
     if (cancelled()) {
-        throw Failure{vshi_job_fail_cancelled(job, error)};
+        require(vshi_job_fail_cancelled, job);
     }
 }
 
@@ -168,9 +169,9 @@ void set_bounds(vsh_grid_info &info, const openvdb::CoordBBox &voxels) {
     }
 }
 
-// The findings of closing a leaf.
+// Facts about a closed leaf.
 struct Closed {
-    openvdb::CoordBBox box; // of voxels inside the surface or next to it
+    openvdb::CoordBBox box; // around voxels inside the surface or next to it
     size_t active = 0;
     bool uniform = true; // all of one sign
 };
@@ -238,29 +239,26 @@ vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage
     return grid.release();
 }
 
-openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3], vsh_error *error) {
+openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3]) {
     for (int axis = 0; axis < 3; ++axis) {
         if (size[axis] < 1 || int64_t(index_min[axis]) + size[axis] - 1 > INT32_MAX) {
-            throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "copy: %d voxels from %d on along %c",
-                                    size[axis], index_min[axis], "xyz"[axis])};
+            refuse(VSH_ERROR_ARGUMENT, "copy: %d voxels from %d on along %c", size[axis], index_min[axis],
+                   "xyz"[axis]);
         }
     }
     return {Coord(index_min), Coord(index_min).offsetBy(size[0] - 1, size[1] - 1, size[2] - 1)};
 }
 
-void copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
-                vsh_error *error) {
-    openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense( // x fastest
-        box_to_copy(index_min, size, error), values);
+void copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values) {
+    openvdb::tools::Dense<float, openvdb::tools::LayoutXYZ> dense(box_to_copy(index_min, size), values);
     openvdb::tools::copyToDense(tree, dense, true);
 }
 
-void check_openvdb(uint32_t version, uint32_t abi, vsh_error *error) {
+void check_openvdb(uint32_t version, uint32_t abi) {
     if (version != OPENVDB_LIBRARY_VERSION_NUMBER || abi != OPENVDB_ABI_VERSION_NUMBER) {
-        throw Failure{vshi_fail(error, VSH_ERROR_UNSUPPORTED,
-                                "OpenVDB %u.%u.%u (ABI %u): vdbshade was compiled against %s (ABI %d)",
-                                version >> 24, version >> 16 & 0xff, version & 0xffff, abi,
-                                OPENVDB_LIBRARY_VERSION_STRING, OPENVDB_ABI_VERSION_NUMBER)};
+        refuse(VSH_ERROR_UNSUPPORTED, "OpenVDB %u.%u.%u (ABI %u): vdbshade was compiled against %s (ABI %d)",
+               version >> 24, version >> 16 & 0xff, version & 0xffff, abi, OPENVDB_LIBRARY_VERSION_STRING,
+               OPENVDB_ABI_VERSION_NUMBER);
     }
 }
 
@@ -283,23 +281,16 @@ size_t vshi_grid_leaves(const vsh_grid *grid, vshi_leaf *leaves, size_t capacity
             leaves[count] = {{origin[0], origin[1], origin[2]}, leaf->buffer().data()};
         }
     }
-    std::sort(leaves, leaves + std::min(count, capacity), [](const vshi_leaf &a, const vshi_leaf &b) {
-        return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
-    });
+    std::sort(leaves, leaves + std::min(count, capacity), vshi::comes_before<vshi_leaf>);
     return count;
 }
 
 void vshi_grid_block_signs(const vsh_grid *grid, const int32_t origin[3], const int32_t size[3],
                            int8_t *signs) {
     openvdb::FloatGrid::ConstUnsafeAccessor tree(grid->level_set->constTree());
-    for (int32_t x = 0; x < size[0]; ++x) {
-        for (int32_t y = 0; y < size[1]; ++y) {
-            for (int32_t z = 0; z < size[2]; ++z) {
-                const openvdb::Coord block(origin[0] + 8 * x, origin[1] + 8 * y, origin[2] + 8 * z);
-                *signs++ = tree.getValue(block) < 0.0f ? -1 : 1;
-            }
-        }
-    }
+    const openvdb::Coord low(origin), last = low.offsetBy(8 * size[0] - 1, 8 * size[1] - 1, 8 * size[2] - 1);
+    vshi::visit_blocks({low, last}, 8,
+                       [&](const openvdb::Coord &block) { *signs++ = tree.getValue(block) < 0.0f ? -1 : 1; });
 }
 
 vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const int32_t size[3],
@@ -308,10 +299,8 @@ vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const
     VSHI_NEEDS(index_min);
     VSHI_NEEDS(size);
     VSHI_NEEDS(values);
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "grid", [&]() -> vsh_result {
-        vshi::copy_dense(grid->level_set->constTree(), index_min, size, values, error);
-        return VSH_OK;
-    });
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "grid",
+                       [&] { vshi::copy_dense(grid->level_set->constTree(), index_min, size, values); });
 }
 
 vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32_t abi, const vsh_run *run,
@@ -319,21 +308,18 @@ vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32
     VSHI_NEEDS(grid);
     *grid = nullptr;
     VSHI_NEEDS(level_set);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return vshi::guard(error, VSH_ERROR_INPUT, "OpenVDB", [&]() -> vsh_result {
-        vshi::check_openvdb(version, abi, error);
+    return vshi::guard_run(run, error, VSH_ERROR_INPUT, "OpenVDB", [&](const vsh_run &full) {
+        vshi::check_openvdb(version, abi);
         const auto &given = *static_cast<const openvdb::FloatGrid::ConstPtr *>(level_set);
         if (given == nullptr) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "the OpenVDB grid is NULL");
+            vshi::refuse(VSH_ERROR_ARGUMENT, "the OpenVDB grid is NULL");
         }
-        vshi::Stage stage(full, "load", error);
-        const vshi::Named named{"OpenVDB", given->getName()};
-        vshi::refuse_bad(named, vshi::examine_kind(*given), error);
-        vshi::refuse_large(named, full, double(given->memUsage()), error);
-        vshi::LevelSet set{named, given->deepCopy(), vshi::shell_of(*given)};
-        *grid = vshi::close_level_set(set, stage, error);
-        return VSH_OK;
+        vshi::Stage stage(full, "load");
+        const vshi::GridName name{"OpenVDB", given->getName()};
+        vshi::refuse_bad(name, vshi::examine_kind(*given));
+        vshi::check_bytes(full, double(given->memUsage()), name.text().c_str());
+        vshi::LevelSet set{name, given->deepCopy(), vshi::shell_of(*given)};
+        *grid = vshi::close_level_set(set, stage);
     });
 }
 
@@ -342,8 +328,7 @@ vsh_result vsh_grid_to_openvdb(const vsh_grid *grid, uint32_t version, uint32_t 
     VSHI_NEEDS(grid);
     VSHI_NEEDS(level_set);
     return vshi::guard(error, VSH_ERROR_LIMIT, "OpenVDB", [&] {
-        vshi::check_openvdb(version, abi, error);
+        vshi::check_openvdb(version, abi);
         *static_cast<openvdb::FloatGrid::ConstPtr *>(level_set) = vshi::named_surface(*grid, "surface");
-        return VSH_OK;
     });
 }

@@ -1,11 +1,11 @@
-// What the OpenVDB shims share: the handle, the lattice of a new grid, and a stage of work under way.
+// Shared by all that is compiled against OpenVDB: failures, the handle of a level set, the lattice of a new
+// grid, and a stage of work.
 #pragma once
 
 #include "base/job.h"
 #include "base/memory.h"
-#include "extern/arenas.h"
 #include "extern/guard.h"
-#include "extern/tsan.h"
+#include "extern/tbb.h"
 #include "levelset/access.h"
 
 #include <algorithm>
@@ -34,6 +34,36 @@ using Leaf = FloatTree::LeafNodeType;
 using UpperNode = FloatTree::RootNodeType::ChildNodeType;
 using LowerNode = UpperNode::ChildNodeType;
 
+// Throws a Failure.
+[[noreturn]] void refuse(vsh_result code, const char *format, ...) __attribute__((format(printf, 2, 3)));
+
+// Runs body(full) as a public function, with the run that its caller gave or the default one.
+template <typename Body>
+vsh_result guard_run(const vsh_run *run, vsh_error *error, vsh_result code, const char *what,
+                     const Body &body) {
+    vsh_run full;
+    VSHI_TRY(vshi_run_resolve(run, &full, error));
+    return guard(error, code, what, [&] { body(full); });
+}
+
+// Orders leaves and blocks by origin: x, then y, then z.
+template <typename Block> bool comes_before(const Block &a, const Block &b) {
+    return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
+}
+
+// Calls use(origin) for each block of `size` voxels (a power of two) that a box touches: by x, then y, then
+// z.
+template <typename Use> void visit_blocks(const openvdb::CoordBBox &box, int32_t size, const Use &use) {
+    const Coord first = box.min() & ~(size - 1);
+    for (int32_t x = first[0]; x <= box.max()[0]; x += size) {
+        for (int32_t y = first[1]; y <= box.max()[1]; y += size) {
+            for (int32_t z = first[2]; z <= box.max()[2]; z += size) {
+                use(Coord(x, y, z));
+            }
+        }
+    }
+}
+
 // Bytes of a grid per leaf: 512 values, two masks, origin, and its share of the nodes above.
 constexpr double BYTES_PER_LEAF = 2400.0;
 
@@ -45,12 +75,12 @@ constexpr double LARGEST_VOXEL = 1e12;
 // overflow.
 constexpr int32_t LARGEST_INDEX = 1 << 28;
 
-// About how many leaves the band takes that reaches `half_width` voxels to either side of a surface of `area`
+// Estimates the leaves of a band that reaches `half_width` voxels to either side of a surface of `area`
 // voxel² in a box of `sides` voxels.
 double band_leaves(double area, const Vec3d &sides, double half_width);
 
-// Where the voxels of a new grid lie: world = voxel · index + translation, the translation being a whole
-// number of voxels near the middle of the bounds, so that indices stay small far from the origin.
+// The lattice of a new grid: world = voxel · index + translation. The translation is a whole number of voxels
+// near the middle of the bounds, so that indices stay small far from the origin.
 struct Lattice {
     double voxel;      // world units
     double half_width; // voxels
@@ -63,38 +93,37 @@ struct Lattice {
     openvdb::math::Transform::Ptr transform() const;
 };
 
-// Checks the options and lays the lattice over the bounds; throws Failure. Indices beyond ±2^28 are refused.
-Lattice make_lattice(const vsh_grid_options *options, const Vec3d &low, const Vec3d &high, vsh_error *error);
+// Checks the options and lays the lattice over the bounds. Indices beyond ±2^28 are refused.
+Lattice make_lattice(const vsh_grid_options *options, const Vec3d &low, const Vec3d &high);
 
-// VSH_ERROR_LIMIT, naming `what`, where `bytes` pass the run's memory limit or the machine's memory: OpenVDB
-// ends the process when its thread pool runs out.
-vsh_result check_bytes(const vsh_run *run, double bytes, const char *what, vsh_error *error);
+// Fails with VSH_ERROR_LIMIT, naming `what`, if `bytes` exceed the run's memory limit or the machine's
+// memory: OpenVDB ends the process when its thread pool runs out.
+void check_bytes(const vsh_run &run, double bytes, const char *what);
 
-// The same for a grid that is to be made, as Failure; `leaves` are named in the message as voxels of the
-// band.
-void check_memory(const vsh_run *run, double voxel, double leaves, double bytes, vsh_error *error);
+// The same for a new grid; its message gives `leaves` as voxels of the band.
+void check_memory(const vsh_run &run, double voxel, double leaves, double bytes);
 
-// A stage of work with progress given as a fraction, on as many threads as the run says.
+// A stage of work on the run's threads. Its progress is a fraction.
 class Stage {
   public:
-    Stage(const vsh_run &run, const char *name, vsh_error *error);
+    Stage(const vsh_run &run, const char *name);
     ~Stage() { vshi_job_end(job); }
     Stage(const Stage &) = delete;
     Stage &operator=(const Stage &) = delete;
 
     void reach(double fraction); // any thread; a smaller fraction than before does nothing
     bool cancelled() { return vshi_job_advance(job, 0); } // polls the callback
-    void check();                                         // throws Failure when cancelled
+    void check();                                         // throws when cancelled
 
-    // body(i) for 0 … count - 1, the fraction going from `begin` to `end` meanwhile; throws when cancelled.
+    // Calls body(i) for 0 … count - 1, while the fraction goes from `begin` to `end`; throws when cancelled.
     template <typename Body> void loop(size_t count, size_t grain, double begin, double end, Body &&body) {
         std::atomic<size_t> done{0};
-        give(&done);
+        release(&done);
         arena.execute([&] {
             tbb::parallel_for(
                 tbb::blocked_range<size_t>(0, count, grain),
                 [&](const tbb::blocked_range<size_t> &range) {
-                    take(&done); // before anything of this loop is read
+                    acquire(&done); // before anything of this loop is read
                     if (!vshi_job_cancelled(job)) {
                         for (size_t i = range.begin(); i != range.end(); ++i) {
                             body(i);
@@ -102,11 +131,11 @@ class Stage {
                         const size_t so_far = done.fetch_add(range.size()) + range.size();
                         reach(begin + (end - begin) * double(so_far) / double(count));
                     }
-                    give(&done);
+                    release(&done);
                 },
                 tbb::simple_partitioner());
         });
-        take(&done);
+        acquire(&done);
         check();
     }
 
@@ -117,24 +146,22 @@ class Stage {
   private:
     static constexpr size_t UNITS = 1000000;
     vshi_job *job;
-    vsh_error *error;
     LentArena arena;
     std::atomic<size_t> reached{0};
 };
 
-// Closes a level set into a handle: values at or beyond the background become ± background and inactive, all
-// others active; `shell` is the thickness of open meshes in it, world units.
+// Makes a handle of a level set. Values at or beyond the background become ± background and inactive, all
+// others active. `shell` is the thickness of open meshes in it, world units.
 vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage);
 
-// Throws Failure where a box to copy holds no voxel, or ends beyond what indices can be.
-openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3], vsh_error *error);
+// The box of a dense copy. Fails if it holds no voxel, or ends beyond the largest index.
+openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3]);
 
-// A dense copy of a tree's values, x fastest.
-void copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values,
-                vsh_error *error);
+// Copies a box of a tree's values, x fastest.
+void copy_dense(const FloatTree &tree, const int32_t index_min[3], const int32_t size[3], float *values);
 
-// Throws Failure for a caller that was compiled against another OpenVDB: its grids are other classes, though
-// their names are alike.
-void check_openvdb(uint32_t version, uint32_t abi, vsh_error *error);
+// Fails for a caller that was compiled against another OpenVDB: its classes of grids differ, though their
+// names are alike.
+void check_openvdb(uint32_t version, uint32_t abi);
 
 } // namespace vshi

@@ -1,6 +1,6 @@
-// Level sets from meshes: solids together, rooms cut out of them, walls behind the faces of others, sheets as
-// shells. Filling a solid fills its rooms; each is cut out afterwards of the solids that it lies in and of no
-// others, so that what stands in a room or reaches into it stays.
+// Level sets from meshes: solids together, rooms cut out of them, walls behind other faces, sheets as shells.
+// Filling a solid fills its rooms. Each room is cut out of the solids around it and of no others, so that
+// pillars and furniture in the room stay.
 #include "levelset/surface.h"
 #include "mesh/alpha_mask.h"
 #include "mesh/mesh_set.h"
@@ -16,9 +16,9 @@ namespace vshi {
 
 namespace {
 
-// Distances, sides, the leaf that is made of them, and one more set of distances where solids overlap; and
-// what a triangle takes as polygon, corners and in the lists of what it is near to. Measured over the assets
-// at 512 and 1024 voxels: the whole estimate comes to 1.6 to 2.4 times the peak.
+// A leaf takes distances, sides, the leaf itself, and once more distances where solids overlap. A triangle
+// takes a polygon, corners, and places in lists. Measured over the assets at 512 and 1024 voxels, the whole
+// estimate is 1.6 to 2.4 times the peak.
 constexpr double MESH_BYTES_PER_LEAF = 3.0 * BYTES_PER_LEAF;
 constexpr double BYTES_PER_TRIANGLE = 160.0;
 
@@ -27,12 +27,13 @@ constexpr double BYTES_PER_TRIANGLE = 160.0;
 constexpr double MOST_VISITS = 3e6;
 constexpr double NARROW = 12.0;
 
+// Checked meshes.
 struct Meshes {
     vshi_mesh_set set{};
     Vec3d low{DBL_MAX};
     Vec3d high{-DBL_MAX};
     size_t triangles = 0;
-    // all meshes, if masks cut some: those are the opaque pieces
+    // If masks cut some meshes, all meshes: for those their opaque pieces
     std::vector<vsh_mesh> cut;
     std::vector<vshi_mask_pieces> pieces;
 
@@ -49,11 +50,11 @@ struct Meshes {
     const vsh_mesh_report &report(size_t i) const { return set.checked[i].report; }
 };
 
-void look_over(const vsh_mesh *mesh, size_t count, Meshes &meshes, vsh_error *error) {
+void check_meshes(const vsh_mesh *mesh, size_t count, Meshes &meshes) {
     if (mesh == nullptr || count == 0) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "voxelize: no meshes")};
+        refuse(VSH_ERROR_ARGUMENT, "voxelize: no meshes");
     }
-    require(vshi_mesh_set_create(mesh, count, &meshes.set, error));
+    require(vshi_mesh_set_create, mesh, count, &meshes.set);
     for (size_t i = 0; i < count; ++i) {
         const vsh_mesh_report &report = meshes.report(i);
         meshes.low = openvdb::math::minComponent(meshes.low, Vec3d(report.bounds_min));
@@ -61,21 +62,19 @@ void look_over(const vsh_mesh *mesh, size_t count, Meshes &meshes, vsh_error *er
         meshes.triangles += mesh[i].triangle_count - report.degenerate_triangles;
     }
     if (meshes.triangles == 0) {
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "voxelize: %zu mesh%s without a triangle of any area",
-                                count, count == 1 ? "" : "es")};
+        refuse(VSH_ERROR_INPUT, "voxelize: %zu mesh%s without a triangle of any area", count,
+               count == 1 ? "" : "es");
     }
     if (meshes.triangles > size_t(INT32_MAX)) {
-        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT, "voxelize: %zu triangles, %d at most",
-                                meshes.triangles, INT32_MAX)};
+        refuse(VSH_ERROR_LIMIT, "voxelize: %zu triangles, %d at most", meshes.triangles, INT32_MAX);
     }
 }
 
-// How long the pieces are that a mask leaves of triangles, voxels: the border is as near as half of one.
+// Longest pieces into which masks cut triangles, voxels: the border is exact to half of that.
 constexpr double PIECE = 0.5;
 
-// Cuts the meshes that have masks. `run` comes to hold what is made.
-void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes, vsh_run &run,
-               vsh_error *error) {
+// Cuts the meshes that have masks. run.memory_held grows by their pieces.
+void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes, vsh_run &run) {
     const auto masked = [](const vsh_mesh &mesh) { return mesh.mask != nullptr; };
     if (std::none_of(given, given + count, masked)) {
         return;
@@ -88,7 +87,7 @@ void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes
             continue;
         }
         vshi_mask_pieces &pieces = meshes.pieces[i];
-        require(vshi_mask_pieces_cut(&mesh, PIECE * voxel, &run, &pieces, error));
+        require(vshi_mask_pieces_cut, &mesh, PIECE * voxel, &run, &pieces);
         mesh.positions = pieces.positions;
         mesh.indices = pieces.indices;
         mesh.vertex_count = 3 * pieces.count;
@@ -102,10 +101,10 @@ void cut_masks(const vsh_mesh *given, size_t count, double voxel, Meshes &meshes
     }
     vshi_mesh_set_free(&meshes.set);
     meshes.triangles = 0;
-    look_over(meshes.cut.data(), count, meshes, error);
+    check_meshes(meshes.cut.data(), count, meshes);
 }
 
-// Of a wide band to either side of a surface, voxels.
+// Half width of the band that a component is measured in, voxels.
 double band_of(const vshi_component &component, const Lattice &lattice) {
     const double shell = component.kind == VSHI_KIND_WALL    ? lattice.shell
                          : component.kind == VSHI_KIND_SHEET ? 0.5 * lattice.shell
@@ -115,32 +114,30 @@ double band_of(const vshi_component &component, const Lattice &lattice) {
 
 // Refuses wide bands of many triangles. A triangle smaller than a region reaches (half width / 16 + 1)³ of
 // them.
-void check_work(size_t triangles, double half_width, vsh_error *error) {
+void check_work(size_t triangles, double half_width) {
     const double widest = std::max(NARROW, 16.0 * (std::cbrt(MOST_VISITS / double(triangles)) - 1.0));
     if (half_width > widest) {
-        throw Failure{
-            vshi_fail(error, VSH_ERROR_LIMIT,
-                      "half_width %g: a band this wide takes minutes for %zu triangles; use at most "
-                      "%.0f (the field's coarser levels reach farther anyway)",
-                      half_width, triangles, std::floor(widest))};
+        refuse(
+            VSH_ERROR_LIMIT,
+            "half_width %g: a band this wide takes minutes for %zu triangles; use at most %.0f (the field's "
+            "coarser levels reach farther anyway)",
+            half_width, triangles, std::floor(widest));
     }
 }
 
-void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, vsh_error *error) {
+// Estimates the memory for all objects, and checks it.
+void check_leaves(const Meshes &meshes, const Lattice &lattice, const vsh_run &run) {
     double leaves = 0.0;
-    const vshi_solidity *solidity = meshes.set.solidity;
-    const vshi_wholes &wholes = *vshi_solidity_wholes(solidity);
-    for (size_t w = 0; w < wholes.count; ++w) {
-        size_t count = 0;
-        const vshi_component *components = vshi_solidity_of_whole(solidity, w, &count);
-        double band = lattice.half_width, twice = 0.0;
-        for (size_t i = 0; i < count; ++i) {
-            band = std::max(band, band_of(components[i], lattice));
-            twice += components[i].kind == VSHI_KIND_WALL ? components[i].area : 0.0;
+    const vshi_solidity &solidity = *meshes.set.solidity;
+    for (size_t w = 0; w < solidity.wholes.count; ++w) {
+        double band = lattice.half_width, area = 0.0;
+        for (size_t i = solidity.first[w]; i < solidity.first[w + 1]; ++i) {
+            const vshi_component &component = solidity.components[i];
+            band = std::max(band, band_of(component, lattice));
+            area += component.kind == VSHI_KIND_WALL ? component.area : 0.0; // walls are measured twice
         }
-        double area = twice;
         Vec3d low(DBL_MAX), high(-DBL_MAX);
-        for (size_t i = wholes.first[w]; i < wholes.first[w + 1]; ++i) {
+        for (size_t i = solidity.wholes.first[w]; i < solidity.wholes.first[w + 1]; ++i) {
             area += meshes.report(i).area;
             low = openvdb::math::minComponent(low, Vec3d(meshes.report(i).bounds_min));
             high = openvdb::math::maxComponent(high, Vec3d(meshes.report(i).bounds_max));
@@ -149,8 +146,8 @@ void foretell(const Meshes &meshes, const Lattice &lattice, const vsh_run &run, 
             leaves += band_leaves(area / (lattice.voxel * lattice.voxel), (high - low) / lattice.voxel, band);
         }
     }
-    check_memory(&run, lattice.voxel, leaves,
-                 leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE, error);
+    check_memory(run, lattice.voxel, leaves,
+                 leaves * MESH_BYTES_PER_LEAF + double(meshes.triangles) * BYTES_PER_TRIANGLE);
 }
 
 // --- components sorted by kind
@@ -164,14 +161,14 @@ struct Solid {
 // Faces with a thin wall behind them. Walls that stand apart are voxelised together.
 struct Wall {
     bool inward = true; // the faces look inwards, and the wall is outside of them; else within
-    bool open = false;  // `closed` has triangles over holes
+    bool open = false;  // the faces have holes
     Surface faces;
     Surface closed;                    // with their holes closed
     std::vector<openvdb::BBoxd> boxes; // index space
 };
 
 struct Parts {
-    std::vector<Solid> solids; // the first takes all that have no rooms
+    std::vector<Solid> solids; // the first holds all solids without rooms
     std::vector<Wall> walls;
     Surface sheets;
 };
@@ -190,28 +187,27 @@ void add_triangle(const vshi_vec corner[3], const Lattice &lattice, Surface &sur
     surface.polygons.emplace_back(first, first + 1, first + 2, UINT32_MAX);
 }
 
+// Sorts components by kind.
 class Sorting {
   public:
-    Sorting(const vshi_solidity *solidity, const Lattice &lattice_, double apart_)
-        : lattice(lattice_), apart(apart_), all(vshi_solidity_components(solidity, &count)),
-          wholes(*vshi_solidity_wholes(solidity)), rooms(count) {
-        size_t cuts = 0;
-        const vshi_cut *cut = vshi_solidity_cuts(solidity, &cuts);
-        for (size_t i = 0; i < cuts; ++i) {
-            rooms[cut[i].solid].push_back(cut[i].room);
+    Sorting(const vshi_solidity &solidity_, const Lattice &lattice_, double apart_)
+        : solidity(solidity_), lattice(lattice_), apart(apart_), rooms(solidity.count) {
+        for (size_t i = 0; i < solidity.cut_count; ++i) {
+            rooms[solidity.cuts[i].solid].push_back(solidity.cuts[i].room);
         }
         parts.solids.resize(1);
     }
 
     Parts sort() {
-        for (size_t i = 0; i < count; ++i) {
-            add_component(wholes.meshes[all[i].whole], all[i]);
+        for (size_t i = 0; i < solidity.count; ++i) {
+            add_component(i);
         }
         return std::move(parts);
     }
 
   private:
-    void add_faces(const vsh_mesh &mesh, const vshi_component &c, Surface &surface) const {
+    void add_faces(const vshi_component &c, Surface &surface) const {
+        const vsh_mesh &mesh = solidity.wholes.meshes[c.whole];
         for (size_t at = 0; at < c.triangles; ++at) {
             if (!vshi_mesh_degenerate(&mesh, c.list[at])) {
                 vshi_vec corner[3];
@@ -221,46 +217,43 @@ class Sorting {
         }
     }
 
-    void add_caps(const vshi_component &c, Surface &surface) const {
+    void add_closed(const vshi_component &c, Surface &surface) const {
+        add_faces(c, surface);
         for (size_t k = 0; k < c.open_edges; ++k) {
             add_triangle(c.cap[k], lattice, surface);
         }
     }
 
-    void add_closed(const vsh_mesh &mesh, const vshi_component &c, Surface &surface) const {
-        add_faces(mesh, c, surface);
-        add_caps(c, surface);
-    }
-
-    void add_component(const vsh_mesh &mesh, const vshi_component &c) {
+    void add_component(size_t i) {
+        const vshi_component &c = solidity.components[i];
         switch (c.kind) {
         case VSHI_KIND_SHEET:
-            add_faces(mesh, c, parts.sheets);
+            add_faces(c, parts.sheets);
             break;
         case VSHI_KIND_WALL:
-            add_wall(mesh, c);
+            add_wall(c);
             break;
         case VSHI_KIND_SOLID:
-            add_closed(mesh, c, solid_of(rooms[size_t(&c - all)]).outward);
+            add_closed(c, solid_with(rooms[i]).outward);
             break;
-        case VSHI_KIND_ROOM: // comes with its solids
+        case VSHI_KIND_ROOM: // added with its solids
             break;
         }
     }
 
-    // The solid with these rooms; a new one is given them.
-    Solid &solid_of(const Rooms &cut) {
+    // The solid with these rooms, which may be new.
+    Solid &solid_with(const Rooms &cut) {
         const auto [found, is_new] = numbers.try_emplace(cut, parts.solids.size());
         if (is_new) {
             parts.solids.emplace_back();
             for (const uint32_t room : cut) {
-                add_closed(wholes.meshes[all[room].whole], all[room], parts.solids.back().rooms);
+                add_closed(solidity.components[room], parts.solids.back().rooms);
             }
         }
         return parts.solids[found->second];
     }
 
-    void add_wall(const vsh_mesh &mesh, const vshi_component &c) {
+    void add_wall(const vshi_component &c) {
         openvdb::BBoxd box(to_index(lattice, c.low), to_index(lattice, c.high));
         box.expand(0.5 * apart);
         auto wall = std::find_if(parts.walls.begin(), parts.walls.end(), [&](const Wall &w) {
@@ -274,15 +267,13 @@ class Sorting {
         }
         wall->boxes.push_back(box);
         wall->open |= c.open_edges > 0;
-        add_faces(mesh, c, wall->faces);
-        add_closed(mesh, c, wall->closed);
+        add_faces(c, wall->faces);
+        add_closed(c, wall->closed);
     }
 
+    const vshi_solidity &solidity;
     const Lattice &lattice;
     const double apart;
-    size_t count = 0;
-    const vshi_component *all;
-    const vshi_wholes &wholes;
     std::vector<Rooms> rooms;                      // of each solid
     std::map<Rooms, size_t> numbers{{Rooms{}, 0}}; // of the solids, by their rooms
     Parts parts;
@@ -308,21 +299,21 @@ struct Progress {
     double done;
     double per_triangle;
 
-    double next(const Surface &surface) { return done += per_triangle * double(surface.polygons.size()); }
+    double advance(const Surface &surface) { return done += per_triangle * double(surface.polygons.size()); }
 };
 
-// NULL where it has no triangles.
+// Returns NULL for a solid without triangles.
 FloatGrid::Ptr fill_solid(const Solid &solid, const Lattice &lattice, Progress &progress, Stage &stage) {
     if (solid.outward.polygons.empty()) {
         return nullptr;
     }
     double begin = progress.done;
-    const FloatGrid::Ptr filled =
-        fill_surface(solid.outward, lattice, lattice.half_width, begin, progress.next(solid.outward), stage);
+    const FloatGrid::Ptr filled = fill_surface(solid.outward, lattice, lattice.half_width, begin,
+                                               progress.advance(solid.outward), stage);
     if (!solid.rooms.polygons.empty()) {
         begin = progress.done;
-        const FloatGrid::Ptr rooms =
-            fill_surface(solid.rooms, lattice, lattice.half_width, begin, progress.next(solid.rooms), stage);
+        const FloatGrid::Ptr rooms = fill_surface(solid.rooms, lattice, lattice.half_width, begin,
+                                                  progress.advance(solid.rooms), stage);
         stage.run([&] { openvdb::tools::csgDifference(*filled, *rooms); });
     }
     return filled;
@@ -336,9 +327,9 @@ void unite(FloatGrid::Ptr &united, const FloatGrid::Ptr &more, Stage &stage) {
     }
 }
 
-// A wall behind faces that look inwards, or behind the skin of what is hollow.
+// A wall behind faces that look inwards, or behind the outer skin of a house with open rooms.
 FloatGrid::Ptr fill_wall(const Wall &wall, const Lattice &lattice, Progress &progress, Stage &stage) {
-    const double begin = progress.done, end = progress.next(wall.faces);
+    const double begin = progress.done, end = progress.advance(wall.faces);
     const double middle = 0.5 * (begin + end);
     const double half_width = lattice.half_width + lattice.shell;
     FloatGrid::Ptr grown, within;
@@ -361,31 +352,28 @@ FloatGrid::Ptr fill_wall(const Wall &wall, const Lattice &lattice, Progress &pro
     return grown;
 }
 
-// Without signs: what sheets enclose together is air.
+// Measures sheets without signs, as their inside is air.
 FloatGrid::Ptr fill_sheets(const Surface &sheets, const Lattice &lattice, Progress &progress, Stage &stage) {
     const double begin = progress.done;
     FloatGrid::Ptr shell = measure_surface(sheets, lattice, lattice.half_width + 0.5 * lattice.shell, begin,
-                                           progress.next(sheets), stage);
+                                           progress.advance(sheets), stage);
     move_out(*shell, float(0.5 * lattice.shell * lattice.voxel), lattice.background(), stage);
     return shell;
 }
 
-vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options,
-                       const vsh_run *given, vsh_grid **grid, vsh_error *error) {
-    vsh_run run;
-    require(vshi_run_resolve(given, &run, error));
+vsh_grid *from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options, vsh_run run) {
     Meshes meshes;
-    look_over(mesh, count, meshes, error);
-    const Lattice lattice = make_lattice(options, meshes.low, meshes.high, error);
-    cut_masks(mesh, count, lattice.voxel, meshes, run, error);
-    require(vshi_mesh_set_solve(&meshes.set, &run, error));
-    check_work(meshes.triangles, lattice.half_width, error);
-    foretell(meshes, lattice, run, error);
-    Stage stage(run, "voxelize", error);
+    check_meshes(mesh, count, meshes);
+    const Lattice lattice = make_lattice(options, meshes.low, meshes.high);
+    cut_masks(mesh, count, lattice.voxel, meshes, run);
+    require(vshi_mesh_set_solve, &meshes.set, &run);
+    check_work(meshes.triangles, lattice.half_width);
+    check_leaves(meshes, lattice, run);
+    Stage stage(run, "voxelize");
     vshi_mesh_set_note(&meshes.set, lattice.shell, lattice.voxel, &run);
 
     const double reach = 2.0 * (lattice.half_width + lattice.shell) + 2.0;
-    const Parts parts = Sorting(meshes.set.solidity, lattice, reach).sort();
+    const Parts parts = Sorting(*meshes.set.solidity, lattice, reach).sort();
     Progress progress{0.0, 1.0 / double(meshes.triangles)};
     FloatGrid::Ptr united;
     for (const Solid &solid : parts.solids) {
@@ -398,8 +386,7 @@ vsh_result from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_option
     if (sheets) {
         unite(united, fill_sheets(parts.sheets, lattice, progress, stage), stage);
     }
-    *grid = close_grid(united, sheets ? lattice.shell * lattice.voxel : 0.0, stage);
-    return VSH_OK;
+    return close_grid(united, sheets ? lattice.shell * lattice.voxel : 0.0, stage);
 }
 
 } // namespace
@@ -410,6 +397,7 @@ vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count, const
                                 const vsh_run *run, vsh_grid **grid, vsh_error *error) {
     VSHI_NEEDS(grid);
     *grid = nullptr;
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "voxelize",
-                       [&] { return vshi::from_meshes(meshes, mesh_count, options, run, grid, error); });
+    return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "voxelize", [&](const vsh_run &full) {
+        *grid = vshi::from_meshes(meshes, mesh_count, options, full);
+    });
 }

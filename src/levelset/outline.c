@@ -1,13 +1,10 @@
-/* An outline extruded: its distance in closed form from that to the outline. */
+/* An extruded outline: its distance in closed form, from the distance to the outline. */
 #include "outline/outline.h"
 #include "base/elementary.h"
 #include "base/floats.h"
-#include "base/similarity.h"
 #include "base/vec.h"
 
 #include <vdbshade/grid.h>
-
-#include <string.h>
 
 typedef struct extrusion {
     const vsh_outline *outline;
@@ -63,15 +60,7 @@ vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness, c
     vsh_distance field = {
         distance, &e, 1.0, 1, {INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
     const vshi_outline_node *root = &outline->nodes[0];
-    for (int corner = 0; corner < 8; ++corner) {
-        const vshi_vec p = vshi_transform_point(m, (vshi_vec){corner & 1 ? root->high[0] : root->low[0],
-                                                              corner & 2 ? root->high[1] : root->low[1],
-                                                              corner & 4 ? e.half : -e.half});
-        const double world[3] = {p.x, p.y, p.z};
-        for (int axis = 0; axis < 3; ++axis) {
-            field.bounds_min[axis] = fmin(field.bounds_min[axis], world[axis]);
-            field.bounds_max[axis] = fmax(field.bounds_max[axis], world[axis]);
-        }
-    }
+    vshi_grow_box_by(field.bounds_min, field.bounds_max, m, (double[]){root->low[0], root->low[1], -e.half},
+                     (double[]){root->high[0], root->high[1], e.half});
     return vsh_grid_from_distance(&field, options, run, grid, error);
 }

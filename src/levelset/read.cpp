@@ -1,82 +1,360 @@
-// Reading .vdb files, in this process or by run.reader: level sets, lists of grids, dense copies.
+// Reading .vdb files, in this process or by run.reader: level sets, lists of grids, dense copies. The first
+// part is the messages of the reader, whose content the caller checks.
 #include "levelset/file.h"
 
+#include <cmath>
 #include <cstring>
 #include <memory>
 #include <openvdb/tools/Dense.h>
-#include <vector>
+#include <sstream>
+#include <stdexcept>
 
 namespace vshi {
 
-bool Answer::poll(void *user, double fraction) {
-    const Answer &answer = *static_cast<Answer *>(user);
-    answer.stage.reach(0.25 * fraction);
-    return answer.stage.cancelled();
+namespace {
+
+namespace math = openvdb::math;
+
+// --- transforms
+
+// A kind of transform: how many plain numbers OpenVDB writes, and how many of a scale behind them.
+struct Kind {
+    std::string map;
+    size_t plain, scale;
+};
+
+const Kind &kind_of(const std::string &map) {
+    static const std::vector<Kind> all{
+        {math::TranslationMap::mapType(), 3, 0},
+        {math::ScaleMap::mapType(), 0, 3},
+        {math::UniformScaleMap::mapType(), 0, 3},
+        {math::ScaleTranslateMap::mapType(), 3, 3},
+        {math::UniformScaleTranslateMap::mapType(), 3, 3},
+        {math::AffineMap::mapType(), 16, 0},
+        {math::UnitaryMap::mapType(), 16, 0},
+        {math::NonlinearFrustumMap::mapType(), 24, 0}, // the last 16 are of another map
+    };
+    const auto found =
+        std::find_if(all.begin(), all.end(), [&](const Kind &kind) { return kind.map == map; });
+    if (found == all.end()) {
+        throw std::invalid_argument("its transform is of no known kind");
+    }
+    return *found;
 }
 
-vshi_decoder *Answer::ask(int32_t kind, const char *path, const std::function<void(vshi_encoder *)> &encode,
-                          vsh_error *error) {
-    const auto request = std::make_unique<vshi_exchange>();
-    require(vshi_exchange_begin(request.get(), kind, path, &stage.options, error));
-    encode(&request->encoder);
-    require(vshi_exchange_send(request.get(), poll, this, &answer, error));
-    stage.check();
-    return &answer.payload;
+void add(std::vector<double> &numbers, const double *more, size_t count) {
+    numbers.insert(numbers.end(), more, more + count);
 }
 
-void end_request(vshi_decoder *request, const char *path, vsh_error *error) {
-    if (!vshi_decoder_ends(request)) {
-        throw Failure{
-            vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path)};
+void write(std::ostream &out, const double *numbers, size_t count) {
+    out.write(reinterpret_cast<const char *>(numbers), std::streamsize(count * sizeof *numbers));
+}
+
+// Writes a scale, and the numbers that OpenVDB computes from it.
+void write_scale(std::ostream &out, const double *numbers) {
+    const Vec3d scale(numbers), inverse = 1.0 / scale;
+    const Vec3d size(std::fabs(scale[0]), std::fabs(scale[1]), std::fabs(scale[2]));
+    for (const Vec3d &member : {scale, size, inverse, Vec3d(inverse * inverse), Vec3d(inverse / 2.0)}) {
+        member.write(out);
     }
 }
 
-// --- level sets
+} // namespace
 
-vsh_grid *close_level_set(LevelSet &set, Stage &stage, vsh_error *error) {
-    stage.check();
-    refuse_large(set.named, stage.options, double(set.grid->memUsage()), error);
-    const Finding finding = examine_values(*set.grid, stage);
-    refuse_bad(set.named, finding, error);
-    const std::string name = set.named.text();
-    if (finding.kind == Finding::NOTED) {
-        vshi_warn(&stage.options, "%s: %s", name.c_str(), finding.text.c_str());
+TransformData describe_transform(const math::Transform &transform) {
+    TransformData data{transform.mapType(), {}};
+    const Kind &kind = kind_of(data.map);
+    if (const auto frustum = transform.map<math::NonlinearFrustumMap>()) {
+        add(data.numbers, frustum->getBBox().min().asPointer(), 3);
+        add(data.numbers, frustum->getBBox().max().asPointer(), 3);
+        data.numbers.push_back(frustum->getTaper());
+        data.numbers.push_back(frustum->getDepth());
+        add(data.numbers, frustum->secondMap().getMat4().asPointer(), 16);
+        return data;
     }
-    if (finding.kind == Finding::ODD) {
-        vshi_warn(&stage.options, "%s: %s: its distances were made anew", name.c_str(), finding.text.c_str());
-        vsh_error why;
-        try {
-            set.grid = mend(*set.grid, stage, &why);
-        } catch (const Failure &failure) {
-            if (failure.code != VSH_ERROR_CANCELLED) { // the stage has filled `error`
-                vshi_fail(error, failure.code, "%s: %.700s", name.c_str(), why.message);
-            }
-            throw;
-        }
+    // Every other map first writes the numbers that define it, as doubles.
+    std::stringstream text;
+    transform.baseMap()->write(text);
+    data.numbers.resize(kind.plain + kind.scale);
+    text.read(reinterpret_cast<char *>(data.numbers.data()),
+              std::streamsize(data.numbers.size() * sizeof(double)));
+    return data;
+}
+
+math::Transform::Ptr restore_transform(const TransformData &data) {
+    initialize();
+    const Kind &kind = kind_of(data.map);
+    if (data.numbers.size() != kind.plain + kind.scale) {
+        throw std::invalid_argument("its transform has other numbers");
     }
-    return close_grid(set.grid, set.shell, stage);
+    std::stringstream text;
+    openvdb::io::setCurrentVersion(text);
+    openvdb::writeString(text, data.map);
+    const double *numbers = data.numbers.data();
+    if (data.map == math::NonlinearFrustumMap::mapType()) {
+        write(text, numbers, 8);
+        openvdb::writeString(text, math::AffineMap::mapType());
+        write(text, numbers + 8, 16);
+    } else {
+        write(text, numbers, kind.plain);
+    }
+    if (kind.scale > 0) {
+        write_scale(text, numbers + kind.plain);
+    }
+    const auto transform = std::make_shared<math::Transform>();
+    transform->read(text);
+    return transform;
 }
 
 namespace {
 
-vsh_grid *read(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
-    Stage stage(run, "load", error);
+void encode_transform(vshi_encoder *encoder, const math::Transform &transform) {
+    const TransformData data = describe_transform(transform);
+    vshi_encode_text(encoder, data.map.c_str());
+    vshi_encode_array(encoder, data.numbers.data(), data.numbers.size(), sizeof(double));
+}
+
+[[noreturn]] void fail_answer(const char *path, const char *what) {
+    Failure failure;
+    vshi_answer_fail(path, what, &failure.error);
+    throw failure;
+}
+
+math::Transform::Ptr decode_transform(vshi_decoder *decoder, const char *path) {
+    const char *map = vshi_decode_text(decoder, true);
+    TransformData data{map != nullptr ? map : "", {}};
+    try {
+        const Kind &kind = kind_of(data.map);
+        for (size_t i = 0; i < kind.plain + kind.scale; ++i) {
+            data.numbers.push_back(vshi_decode_number(decoder));
+        }
+        if (!decoder->bad) {
+            return restore_transform(data);
+        }
+    } catch (const std::invalid_argument &) {
+    }
+    fail_answer(path, "a transform");
+}
+
+// --- messages: level sets
+
+// A leaf of the tree in a message.
+struct LeafData {
+    int32_t origin[3];
+    int32_t unused;
+    uint64_t active[VSHI_MASK_WORDS];
+    float values[Leaf::SIZE];
+};
+
+// A tile of the tree in a message.
+struct TileData {
+    int32_t origin[3];
+    int32_t level; // 1 … 3: 8, 128 and 4096 voxels wide
+    float value;
+    int32_t active;
+};
+
+constexpr int32_t WIDTHS[4] = {0, 8, 128, 4096};
+constexpr int32_t LAST_INDEX = INT32_MAX - (1 << 13); // a root tile ends before INT32_MAX
+
+bool is_aligned(const int32_t origin[3], int32_t width) {
+    return std::all_of(origin, origin + 3,
+                       [&](int32_t o) { return o % width == 0 && o >= -LAST_INDEX && o <= LAST_INDEX; });
+}
+
+// Adds the first tile of each node that has no children: it makes the node again.
+template <typename Node>
+void add_childless(const FloatTree &tree, int32_t level, std::vector<TileData> &tiles) {
+    std::vector<const Node *> nodes;
+    tree.getNodes(nodes);
+    for (const Node *node : nodes) {
+        if (node->childCount() == 0) {
+            const Coord &at = node->origin();
+            tiles.push_back({{at[0], at[1], at[2]}, level, node->getFirstValue(), node->isValueOn(0)});
+        }
+    }
+}
+
+// The tiles to send. A new node holds inactive background, so such tiles are left out.
+std::vector<TileData> list_tiles(const FloatTree &tree) {
+    std::vector<TileData> tiles;
+    const float background = tree.background();
+    FloatTree::ValueAllCIter tile(tree);
+    tile.setMaxDepth(FloatTree::ValueAllCIter::LEAF_DEPTH - 1);
+    for (; tile; ++tile) {
+        const float value = tile.getValue();
+        const auto level = int32_t(FloatTree::ValueAllCIter::LEAF_DEPTH - tile.getDepth());
+        const bool plain = std::memcmp(&value, &background, sizeof value) == 0 && !tile.isValueOn();
+        if (!plain || level == 3) {
+            const Coord at = tile.getBoundingBox().min();
+            tiles.push_back({{at[0], at[1], at[2]}, level, value, tile.isValueOn()});
+        }
+    }
+    add_childless<UpperNode>(tree, 2, tiles);
+    add_childless<LowerNode>(tree, 1, tiles);
+    return tiles;
+}
+
+void decode_tiles(FloatTree &tree, vshi_decoder *decoder, const char *path) {
+    const uint64_t count = vshi_decode_count(decoder, UINT64_MAX);
+    const auto *tiles = static_cast<const TileData *>(vshi_decode_array(decoder, count, sizeof(TileData)));
+    for (uint64_t i = 0; tiles != nullptr && i < count; ++i) {
+        const TileData &tile = tiles[i];
+        if (tile.level < 1 || tile.level > 3 || !is_aligned(tile.origin, WIDTHS[tile.level]) ||
+            (tile.active != 0 && tile.active != 1)) {
+            fail_answer(path, "a tile's place");
+        }
+        tree.addTile(openvdb::Index(tile.level), Coord(tile.origin), tile.value, tile.active != 0);
+    }
+}
+
+void decode_leaves(FloatTree &tree, vshi_decoder *decoder, const char *path) {
+    const uint64_t count = vshi_decode_count(decoder, UINT64_MAX);
+    const auto *leaves = static_cast<const LeafData *>(vshi_decode_array(decoder, count, sizeof(LeafData)));
+    openvdb::tree::ValueAccessor<FloatTree, false> accessor(tree);
+    for (uint64_t i = 0; leaves != nullptr && i < count; ++i) {
+        const LeafData &data = leaves[i];
+        const Coord origin(data.origin);
+        if (!is_aligned(data.origin, 8) || accessor.probeConstLeaf(origin) != nullptr) {
+            fail_answer(path, "a leaf's place");
+        }
+        auto leaf = std::make_unique<Leaf>(origin, 0.0f, false);
+        std::memcpy(leaf->buffer().data(), data.values, sizeof data.values);
+        for (openvdb::Index word = 0; word < VSHI_MASK_WORDS; ++word) {
+            leaf->getValueMask().getWord<uint64_t>(word) = data.active[word];
+        }
+        accessor.addLeaf(leaf.release());
+    }
+}
+
+} // namespace
+
+void encode_level_set(vshi_encoder *encoder, const LevelSet &set) {
+    const FloatTree &tree = set.grid->constTree();
+    vshi_encode_text(encoder, set.name.grid.c_str());
+    vshi_encode_number(encoder, set.shell);
+    encode_transform(encoder, set.grid->transform());
+    const float background = tree.background();
+    vshi_encode_array(encoder, &background, 1, sizeof background);
+    const std::vector<TileData> tiles = list_tiles(tree);
+    vshi_encode_count(encoder, tiles.size());
+    vshi_encode_array(encoder, tiles.data(), tiles.size(), sizeof(TileData));
+    vshi_encode_count(encoder, tree.leafCount());
+    LeafData data{};
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        std::copy(leaf->origin().data(), leaf->origin().data() + 3, data.origin);
+        for (openvdb::Index word = 0; word < VSHI_MASK_WORDS; ++word) {
+            data.active[word] = leaf->getValueMask().getWord<uint64_t>(word);
+        }
+        std::memcpy(data.values, leaf->buffer().data(), sizeof data.values);
+        vshi_encode_array(encoder, &data, 1, sizeof data);
+    }
+}
+
+LevelSet decode_level_set(vshi_decoder *decoder, const char *path) {
+    const char *name = vshi_decode_text(decoder, false);
+    if (name == nullptr) {
+        fail_answer(path, "a name");
+    }
+    LevelSet set{{path, name}, nullptr, vshi_decode_number(decoder)};
+    const math::Transform::Ptr transform = decode_transform(decoder, path);
+    const void *background = vshi_decode_array(decoder, 1, sizeof(float));
+    const auto tree =
+        std::make_shared<FloatTree>(background != nullptr ? *static_cast<const float *>(background) : 0.0f);
+    decode_tiles(*tree, decoder, path);
+    decode_leaves(*tree, decoder, path);
+    if (!vshi_decoder_ends(decoder) || !(set.shell >= 0.0)) {
+        fail_answer(path, "the level set's size");
+    }
+    set.grid = FloatGrid::create(tree);
+    set.grid->setTransform(transform);
+    return set;
+}
+
+// --- messages: voxels
+
+void encode_blocks(vshi_encoder *encoder, const std::string &grid, const math::Transform &transform,
+                   const std::vector<vshi_block> &blocks) {
+    vshi_encode_text(encoder, grid.c_str());
+    encode_transform(encoder, transform);
+    vshi_encode_count(encoder, blocks.size());
+    for (const vshi_block &block : blocks) { // one by one: the struct's padding may hold anything
+        vshi_encode_array(encoder, block.origin, 3, sizeof block.origin[0]);
+        vshi_encode_array(encoder, block.mask, VSHI_MASK_WORDS, sizeof block.mask[0]);
+    }
+}
+
+std::vector<vshi_block> decode_blocks(vshi_decoder *decoder, const char *path, std::string &grid,
+                                      math::Transform::Ptr &transform) {
+    constexpr size_t BLOCK_BYTES = 80;
+    const char *name = vshi_decode_text(decoder, false);
+    grid = name != nullptr ? name : "";
+    transform = decode_transform(decoder, path);
+    const uint64_t count = vshi_decode_count(decoder, uint64_t(decoder->end - decoder->at) / BLOCK_BYTES);
+    std::vector<vshi_block> blocks;
+    blocks.reserve(count);
+    for (uint64_t i = 0; i < count; ++i) {
+        vshi_block block{};
+        const void *origin = vshi_decode_array(decoder, 3, sizeof block.origin[0]);
+        const void *mask = vshi_decode_array(decoder, VSHI_MASK_WORDS, sizeof block.mask[0]);
+        if (origin == nullptr || mask == nullptr) {
+            break;
+        }
+        std::memcpy(block.origin, origin, sizeof block.origin);
+        std::memcpy(block.mask, mask, sizeof block.mask);
+        const bool rises = blocks.empty() || comes_before(blocks.back(), block);
+        if (!rises || !is_aligned(block.origin, 8)) {
+            fail_answer(path, "a block's place");
+        }
+        blocks.push_back(block);
+    }
+    if (name == nullptr || !vshi_decoder_ends(decoder) || blocks.size() != count) {
+        fail_answer(path, "the voxels' number");
+    }
+    return blocks;
+}
+
+// --- requests
+
+bool Answer::poll(void *user, double fraction) {
+    Stage &stage = *static_cast<Stage *>(user);
+    stage.reach(0.25 * fraction);
+    return stage.cancelled();
+}
+
+vshi_decoder *Answer::ask(int32_t kind, const char *path, const std::function<void(vshi_encoder *)> &encode) {
+    const auto request = std::make_unique<vshi_exchange>();
+    require(vshi_exchange_begin, request.get(), kind, path, &stage.options);
+    encode(&request->encoder);
+    require(vshi_exchange_send, request.get(), poll, &stage, &answer);
+    stage.check();
+    return &answer.payload;
+}
+
+void end_request(vshi_decoder *request, const char *path) {
+    if (!vshi_decoder_ends(request)) {
+        refuse(VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
+    }
+}
+
+namespace {
+
+vsh_grid *read(const char *path, const char *name, const vsh_run &run) {
+    Stage stage(run, "load");
     stage.check();
     LevelSet set{{path, ""}, nullptr, 0.0};
     if (run.reader != nullptr) {
         Answer answer(stage);
-        set = take_level_set(
-            answer.ask(
-                VSHI_READ_GRID, path, [&](vshi_encoder *to) { vshi_encode_text(to, name); }, error),
-            path, error);
-        set.grid->setGridClass(openvdb::GRID_LEVEL_SET); // which the reader saw
-        refuse_bad(set.named, examine_kind(*set.grid), error);
-        set.grid->clearGridClass(); // as one that was read here: its mesh is turned by it
+        const auto encode = [&](vshi_encoder *to) { vshi_encode_text(to, name); };
+        set = decode_level_set(answer.ask(VSHI_READ_GRID, path, encode), path);
+        set.grid->setGridClass(openvdb::GRID_LEVEL_SET); // the reader has checked the class
+        refuse_bad(set.name, examine_kind(*set.grid));
+        set.grid->clearGridClass(); // as load_level_set() does: meshing turns level sets over
     } else {
-        set = load_level_set(path, name, stage, error);
+        set = load_level_set(path, name, stage);
     }
     stage.reach(0.3);
-    return close_level_set(set, stage, error);
+    return close_level_set(set, stage);
 }
 
 // --- lists: plain structs, with texts that end
@@ -89,38 +367,35 @@ template <size_t Capacity> bool is_text(const char (&text)[Capacity], bool lines
     return length < Capacity && std::none_of(text, text + length, is_control);
 }
 
-std::vector<vsh_vdb_entry> take_list(vshi_decoder *decoder, const char *path, size_t capacity, size_t *count,
-                                     vsh_error *error) {
+std::vector<vsh_vdb_entry> decode_list(vshi_decoder *decoder, const char *path, size_t capacity,
+                                       size_t *count) {
     const uint64_t all = vshi_decode_count(decoder, UINT32_MAX),
                    listed = vshi_decode_count(decoder, capacity);
     const auto *from =
         static_cast<const vsh_vdb_entry *>(vshi_decode_array(decoder, listed, sizeof(vsh_vdb_entry)));
     if (!vshi_decoder_ends(decoder) || listed > all) {
-        throw Failure{vshi_answer_fail(path, "the list's size", error)};
+        fail_answer(path, "the list's size");
     }
     *count = size_t(all);
     std::vector<vsh_vdb_entry> entries(from, from + listed);
     for (const vsh_vdb_entry &entry : entries) {
         if (!is_text(entry.name) || !is_text(entry.type) || !is_text(entry.grid_class) ||
             !is_text(entry.problem) || !is_text(entry.attributes, true)) {
-            throw Failure{vshi_answer_fail(path, "a text", error)};
+            fail_answer(path, "a text");
         }
     }
     return entries;
 }
 
-void list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count,
-          vsh_error *error) {
+void list(const char *path, const vsh_run &run, vsh_vdb_entry *entries, size_t capacity, size_t *count) {
     std::vector<vsh_vdb_entry> found;
     if (run.reader != nullptr) {
-        Stage stage(run, "load", error);
+        Stage stage(run, "load");
         Answer answer(stage);
-        found = take_list(
-            answer.ask(
-                VSHI_READ_LIST, path, [&](vshi_encoder *to) { vshi_encode_count(to, capacity); }, error),
-            path, capacity, count, error);
+        const auto encode = [&](vshi_encoder *to) { vshi_encode_count(to, capacity); };
+        found = decode_list(answer.ask(VSHI_READ_LIST, path, encode), path, capacity, count);
     } else {
-        *count = list_grids(path, run, found, capacity, error);
+        *count = list_grids(path, run, found, capacity);
     }
     std::copy(found.begin(), found.end(), entries);
 }
@@ -155,63 +430,52 @@ struct CopyGrid {
 };
 
 // A box of a grid to copy.
-struct Wanted {
+struct CopyRequest {
     const char *path, *name;
     int32_t low[3], size[3];
 
     size_t count() const { return size_t(size[0]) * size_t(size[1]) * size_t(size[2]); }
 };
 
-openvdb::CoordBBox box_of(const Wanted &wanted, vsh_error *error) {
-    const int32_t *size = wanted.size;
-    const openvdb::CoordBBox box = box_to_copy(wanted.low, size, error);
+openvdb::CoordBBox box_of(const CopyRequest &request) {
+    const int32_t *size = request.size;
+    const openvdb::CoordBBox box = box_to_copy(request.low, size);
     if (double(size[0]) * double(size[1]) * double(size[2]) > double(INT32_MAX)) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                "copy of %d × %d × %d voxels: expected up to 2^31 - 1", size[0], size[1],
-                                size[2])};
+        refuse(VSH_ERROR_ARGUMENT, "copy of %d × %d × %d voxels: expected up to 2^31 - 1", size[0], size[1],
+               size[2]);
     }
     return box;
 }
 
-void copy(const Wanted &wanted, const vsh_run &run, float *values, float *active, vsh_error *error) {
-    const openvdb::CoordBBox box = box_of(wanted, error);
-    Stage stage(run, "load", error);
+// `values` and `active` may be NULL.
+void copy(const CopyRequest &request, const vsh_run &run, float *values, float *active) {
+    const openvdb::CoordBBox box = box_of(request);
+    Stage stage(run, "load");
     stage.check();
     if (run.reader == nullptr) {
-        const openvdb::GridBase::Ptr grid = read_numbers(wanted.path, wanted.name, run, error);
+        const openvdb::GridBase::Ptr grid = read_numbers(request.path, request.name, run);
         stage.check();
         grid->apply<NumberGrids>(CopyGrid{box, values, active});
         return;
     }
     Answer answer(stage);
     const auto encode = [&](vshi_encoder *to) {
-        vshi_encode_text(to, wanted.name);
-        vshi_encode_array(to, wanted.low, 3, sizeof wanted.low[0]);
-        vshi_encode_array(to, wanted.size, 3, sizeof wanted.size[0]);
+        vshi_encode_text(to, request.name);
+        vshi_encode_array(to, request.low, 3, sizeof request.low[0]);
+        vshi_encode_array(to, request.size, 3, sizeof request.size[0]);
         vshi_encode_count(to, values != nullptr);
         vshi_encode_count(to, active != nullptr);
     };
-    vshi_decoder *payload = answer.ask(VSHI_READ_COPY, wanted.path, encode, error);
+    vshi_decoder *payload = answer.ask(VSHI_READ_COPY, request.path, encode);
     for (float *to : {values, active}) {
-        const void *from = to != nullptr ? vshi_decode_array(payload, wanted.count(), sizeof *to) : nullptr;
+        const void *from = to != nullptr ? vshi_decode_array(payload, request.count(), sizeof *to) : nullptr;
         if (from != nullptr) {
-            std::memcpy(to, from, wanted.count() * sizeof *to);
+            std::memcpy(to, from, request.count() * sizeof *to);
         }
     }
     if (!vshi_decoder_ends(payload)) {
-        throw Failure{vshi_answer_fail(wanted.path, "the copy's size", error)};
+        fail_answer(request.path, "the copy's size");
     }
-}
-
-// The body of a public call, or of a reader's.
-template <typename Body>
-vsh_result call(const vsh_run *run, const char *path, vsh_error *error, const Body &body) {
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return guard(error, VSH_ERROR_READ, path, [&] {
-        body(full);
-        return VSH_OK;
-    });
 }
 
 } // namespace
@@ -220,21 +484,21 @@ vsh_result call(const vsh_run *run, const char *path, vsh_error *error, const Bo
 
 vsh_result vshi_serve_grid(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
-    return vshi::call(run, path, error, [&](const vsh_run &full) {
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path, [&](const vsh_run &full) {
         const char *name = vshi_decode_text(request, false);
-        vshi::end_request(request, path, error);
-        vshi::Stage stage(full, "load", error);
-        vshi::put_level_set(payload, vshi::load_level_set(path, name, stage, error));
+        vshi::end_request(request, path);
+        vshi::Stage stage(full, "load");
+        vshi::encode_level_set(payload, vshi::load_level_set(path, name, stage));
     });
 }
 
 vsh_result vshi_serve_list(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
-    return vshi::call(run, path, error, [&](const vsh_run &full) {
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path, [&](const vsh_run &full) {
         const uint64_t capacity = vshi_decode_count(request, UINT64_MAX);
-        vshi::end_request(request, path, error);
+        vshi::end_request(request, path);
         std::vector<vsh_vdb_entry> found;
-        vshi_encode_count(payload, vshi::list_grids(path, full, found, capacity, error));
+        vshi_encode_count(payload, vshi::list_grids(path, full, found, capacity));
         vshi_encode_count(payload, found.size());
         vshi_encode_array(payload, found.data(), found.size(), sizeof(vsh_vdb_entry));
     });
@@ -242,22 +506,20 @@ vsh_result vshi_serve_list(const char *path, vshi_decoder *request, const vsh_ru
 
 vsh_result vshi_serve_copy(const char *path, vshi_decoder *request, const vsh_run *run, vshi_encoder *payload,
                            vsh_error *error) {
-    return vshi::call(run, path, error, [&](const vsh_run &full) {
-        vshi::Wanted wanted{path, vshi_decode_text(request, false), {}, {}};
-        for (int32_t *to : {wanted.low, wanted.size}) {
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path, [&](const vsh_run &full) {
+        vshi::CopyRequest box{path, vshi_decode_text(request, false), {}, {}};
+        for (int32_t *to : {box.low, box.size}) {
             const void *from = vshi_decode_array(request, 3, sizeof *to);
             if (from != nullptr) {
                 std::memcpy(to, from, 3 * sizeof *to);
             }
         }
-        bool has[2];
-        for (bool &one : has) {
-            one = vshi_decode_count(request, 1) != 0;
-        }
-        vshi::end_request(request, path, error);
-        vshi::box_of(wanted, error); // before memory is taken
-        std::vector<float> values(has[0] ? wanted.count() : 0), active(has[1] ? wanted.count() : 0);
-        vshi::copy(wanted, full, has[0] ? values.data() : nullptr, has[1] ? active.data() : nullptr, error);
+        const bool has_values = vshi_decode_count(request, 1) != 0;
+        const bool has_active = vshi_decode_count(request, 1) != 0;
+        vshi::end_request(request, path);
+        vshi::box_of(box); // before memory is allocated
+        std::vector<float> values(has_values ? box.count() : 0), active(has_active ? box.count() : 0);
+        vshi::copy(box, full, has_values ? values.data() : nullptr, has_active ? active.data() : nullptr);
         vshi_encode_array(payload, values.data(), values.size(), sizeof(float));
         vshi_encode_array(payload, active.data(), active.size(), sizeof(float));
     });
@@ -268,8 +530,8 @@ vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run,
     VSHI_NEEDS(grid);
     *grid = nullptr;
     VSHI_NEEDS(path);
-    return vshi::call(run, path, error,
-                      [&](const vsh_run &full) { *grid = vshi::read(path, name, full, error); });
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path,
+                           [&](const vsh_run &full) { *grid = vshi::read(path, name, full); });
 }
 
 vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
@@ -278,18 +540,18 @@ vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *ent
     *count = 0;
     VSHI_NEEDS(path);
     VSHI_NEEDS_OF(capacity, entries);
-    return vshi::call(run, path, error,
-                      [&](const vsh_run &full) { vshi::list(path, full, entries, capacity, count, error); });
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path,
+                           [&](const vsh_run &full) { vshi::list(path, full, entries, capacity, count); });
 }
 
-vsh_result vsh_vdb_copy(const char *path, const char *name, const int32_t index_min[3], const int32_t size[3],
-                        const vsh_run *run, float *values, float *active, vsh_error *error) {
+vsh_result vshi_vdb_copy(const char *path, const char *name, const int32_t index_min[3],
+                         const int32_t size[3], const vsh_run *run, float *values, float *active,
+                         vsh_error *error) {
     VSHI_NEEDS(path);
     VSHI_NEEDS(index_min);
     VSHI_NEEDS(size);
-    return vshi::call(run, path, error, [&](const vsh_run &full) {
-        const vshi::Wanted wanted{
-            path, name, {index_min[0], index_min[1], index_min[2]}, {size[0], size[1], size[2]}};
-        vshi::copy(wanted, full, values, active, error);
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path, [&](const vsh_run &full) {
+        vshi::copy({path, name, {index_min[0], index_min[1], index_min[2]}, {size[0], size[1], size[2]}},
+                   full, values, active);
     });
 }

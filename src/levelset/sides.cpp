@@ -1,6 +1,7 @@
-// Finds which side of the surface each voxel is on. Voxels well off the surface are joined across their
-// faces, also through missing leaves: no surface passes between them. A voxel near the surface takes the side
-// of a voxel that no surface separates it from. Whatever is not joined with the outside is inside.
+// Finds the side of the surface that each voxel is on. Voxels well off the surface are joined across their
+// faces, and through missing leaves: no surface passes between them. Near the surface, a voxel gets its side
+// from a neighbour if no surface separates the two. All voxels that are not joined with the outside are
+// inside.
 #include "levelset/band.h"
 
 #include <algorithm>
@@ -13,18 +14,18 @@ namespace vshi {
 namespace {
 
 constexpr int LEAF = 8;
-constexpr int EDGE = 10; // of a leaf with the voxels around it
+constexpr int EDGE = 10; // voxels along a leaf and one neighbour at each end
 constexpr uint32_t EXTERIOR = 0;
-// Voxels farther than this from the surface are joined across faces: between two of them no surface passes,
-// and hardly any hole is wide enough to let them through.
+// Voxels farther than this from the surface are joined across faces: no surface passes between two of them,
+// and hardly any hole is wide enough for one.
 constexpr float WELL_OFF = 0.8660255f;
-// Voxels nearer than this lie on the surface: neither side is wrong.
+// Voxels nearer than this lie on the surface: either side is right.
 constexpr float ON = 1e-4f;
-// A segment that passes a triangle's edge within this, voxels, passes through the triangle.
+// A segment that passes a triangle's edge within this distance, voxels, meets the triangle.
 constexpr double AT_EDGE = 1e-6;
-// By how much boxes of triangles are too large, voxels: more than their rounding.
+// Margin of triangles' boxes, voxels: more than their rounding.
 constexpr double BOX_MARGIN = 1e-3;
-// Voxels near the surface learn their sides from their neighbours in so many rounds.
+// Rounds in which voxels near the surface get their sides from neighbours.
 constexpr int ROUNDS = 3;
 
 // Byte z is 1 where bit z is set.
@@ -33,7 +34,7 @@ uint64_t spread(uint64_t byte) {
     return ((copies + 0x7f7f7f7f7f7f7f7fu) | copies) >> 7 & ROW_ENDS;
 }
 
-// Voxels of `within` that hang together with the seed.
+// The voxels of `within` connected to the seed.
 Bits flood(Bits seed, const Bits &within) {
     for (bool changed = true; changed;) {
         changed = false;
@@ -106,7 +107,7 @@ void LeafTable::find_neighbours() {
     std::array<uint32_t, 27> none;
     none.fill(NONE);
     neighbours.assign(leaves.size(), none);
-    size_t next[13] = {}; // by offset: neighbours follow each other as the leaves do
+    size_t next[13] = {}; // by offset: neighbours have the same order as the leaves
     for (size_t i = 0; i < leaves.size(); ++i) {
         neighbours[i][13] = uint32_t(i);
         for (int k = 14; k < 27; ++k) {
@@ -138,7 +139,7 @@ class Joining {
         size_t node = 1 + leaves.size();
         for (const BandLeaf &leaf : leaves) {
             first_part.push_back(node);
-            node += leaf.part_count;
+            node += leaf.parts.size();
         }
         parent.resize(node);
         std::iota(parent.begin(), parent.end(), 0);
@@ -174,20 +175,20 @@ class Joining {
         parent[std::max(a, b)] = uint32_t(std::min(a, b));
     }
 
-    // The run of empty leaves that ends below leaf i, which may not be there; one that begins at infinity is
-    // the exterior.
+    // The run of empty leaves that ends below leaf i, and may be empty. A run that begins at infinity is the
+    // exterior.
     size_t run_below(size_t i) const {
         return i > 0 && same_column(leaves[i - 1].origin, leaves[i].origin) ? 1 + i : EXTERIOR;
     }
 
-    // The run that a place without a leaf lies in.
+    // The run around a place without a leaf.
     size_t run_at(const Cell &place) const {
         const size_t above = table.lower_bound(place);
         return above < leaves.size() && same_column(leaves[above].origin, place) ? run_below(above)
                                                                                  : EXTERIOR;
     }
 
-    // Joins the run below leaf i with those beside it.
+    // Joins the run below leaf i with its neighbours.
     void join_run(size_t i) {
         const int32_t low = leaves[i - 1].origin[2] + LEAF, high = leaves[i].origin[2];
         for (int side = 0; side < 4; ++side) {
@@ -206,7 +207,7 @@ class Joining {
         }
     }
 
-    // Joins the parts of leaf i with what is beyond one of its faces.
+    // Joins the parts of leaf i with the parts or the run beyond one of its faces.
     void join_face(size_t i, int axis, bool last) {
         Cell beyond = leaves[i].origin;
         beyond[axis] += last ? LEAF : -LEAF;
@@ -217,12 +218,12 @@ class Joining {
             return; // the neighbour joins them
         }
         const size_t run = is_there ? EXTERIOR : run_at(beyond);
-        for (size_t p = 0; p < leaves[i].part_count; ++p) {
+        for (size_t p = 0; p < leaves[i].parts.size(); ++p) {
             const uint64_t own = face(leaves[i].parts[p], axis, last);
             if (own != 0 && !is_there) {
                 unite(first_part[i] + p, run);
             }
-            for (size_t q = 0; is_there && q < leaves[neighbour].part_count; ++q) {
+            for (size_t q = 0; is_there && q < leaves[neighbour].parts.size(); ++q) {
                 if ((own & face(leaves[neighbour].parts[q], axis, false)) != 0) {
                     unite(first_part[i] + p, first_part[neighbour] + q);
                 }
@@ -247,7 +248,7 @@ std::vector<KnownSides> find_outside(const LeafTable &table, Stage &stage) {
     std::vector<KnownSides> all(table.leaves.size());
     for (size_t i = 0; i < all.size(); ++i) {
         const BandLeaf &leaf = table.leaves[i];
-        for (size_t p = 0; p < leaf.part_count; ++p) {
+        for (size_t p = 0; p < leaf.parts.size(); ++p) {
             const bool outside = joining.is_outside(i, p);
             for (int x = 0; x < LEAF; ++x) {
                 all[i].known[x] |= leaf.parts[p][x];
@@ -258,7 +259,7 @@ std::vector<KnownSides> find_outside(const LeafTable &table, Stage &stage) {
     return all;
 }
 
-// Part 0, 1 or 2 of the leaves around that position 0 … 9 of the halo lies in.
+// Which of three leaves along an axis holds position 0 … 9 of the halo.
 int part_of(int position) {
     return position == 0 ? 0 : position == EDGE - 1 ? 2 : 1;
 }
@@ -269,15 +270,16 @@ int in_halo(int x, int y, int z) {
 
 struct Halo {
     float distance[EDGE * EDGE * EDGE];
-    int8_t side[EDGE * EDGE * EDGE]; // 1: outside, -1: inside, 0: not known, or tried before
+    int8_t side[EDGE * EDGE * EDGE]; // 1: outside, -1: inside, 0: unknown, or tried before
 };
 
-// The leaf's voxels that are of a set or one of whose 26 neighbours is; `word_of(leaf, x)` tells the set.
+// The leaf's voxels that belong to a set or have one of their 26 neighbours in it. word_of(leaf, x) gives the
+// set.
 template <typename Word> Bits touching(const uint32_t *around, const Word &word_of) {
     const auto word = [&](int k, int x) {
         return around[k] == LeafTable::NONE ? uint64_t(0) : word_of(around[k], size_t(x));
     };
-    // A plane of three leaves along z, with what touches it along z.
+    // A plane of the middle one of three leaves along z, joined with neighbours along z.
     const auto row = [&](int k, int x) {
         const uint64_t own = word(k + 1, x);
         return own | (own << 1 & ~ROW_ENDS) | (own >> 1 & ~(ROW_ENDS << 7)) | (word(k, x) >> 7 & ROW_ENDS) |
@@ -303,7 +305,7 @@ struct Near {
     float low[3], high[3]; // a box around it, from the leaf's origin
 };
 
-// Whether the segment from a to b passes through the triangle; in doubt at its edges, it does.
+// Whether the segment from a to b passes through the triangle, or very near to its edges.
 bool goes_through(const Near &near, const Vec3d &a, const Vec3d &b) {
     const double from = near.normal.dot(a - near.corner[0]), to = near.normal.dot(b - near.corner[0]);
     if (!((from < 0.0 && to > 0.0) || (from > 0.0 && to < 0.0))) {
@@ -356,8 +358,8 @@ class Nearby {
 
   private:
     void fill() {
-        for (size_t i = 0; i < leaf.triangle_count; ++i) {
-            Near one{corners_of(surface, leaf.triangles[i]), {}, {}, {}};
+        for (const uint32_t triangle : leaf.triangles) {
+            Near one{corners_of(surface, triangle), {}, {}, {}};
             one.normal = (one.corner[1] - one.corner[0]).cross(one.corner[2] - one.corner[0]);
             for (int axis = 0; axis < 3; ++axis) {
                 const auto ends =
@@ -374,12 +376,12 @@ class Nearby {
     std::vector<Near> near;
 };
 
-// The side of a voxel that is not known: that of a neighbour that it shares a free ball with, or of one that
-// no triangle parts it from. 0: none.
+// Finds the side of a voxel: that of a neighbour whose free ball overlaps its own, or of a neighbour that no
+// triangle separates from it. 0: none.
 int side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     const int at = in_halo(local[0] + 1, local[1] + 1, local[2] + 1);
     const float own = halo.distance[at];
-    // First the neighbour that lies away from the surface.
+    // First try the neighbour away from the surface.
     constexpr int stride[3] = {EDGE * EDGE, EDGE, 1};
     float slope[3], steepest = 0.0f;
     for (int axis = 0; axis < 3; ++axis) {
@@ -433,11 +435,11 @@ class Settling {
         }
     }
 
-    // Finds the sides of voxels near the surface from those of their neighbours: settle() of every leaf, at
-    // the same time if wanted, then end_round().
+    // A round finds sides of voxels near the surface from those of their neighbours: settle() for every leaf,
+    // on any thread, then end_round().
     void settle(size_t leaf);
     void end_round();
-    Sides tell(size_t leaf) const; // after the rounds
+    Sides sides_of(size_t leaf) const; // after the rounds
 
   private:
     // Known, and not tried in the rounds before.
@@ -448,13 +450,13 @@ class Settling {
     const LeafTable &table;
     const std::vector<BandLeaf> &leaves;
     std::vector<KnownSides> now, next;
-    std::vector<Bits> tried;    // voxels that were known a round before: trying them again is of no use
+    std::vector<Bits> tried;    // voxels known since an earlier round: trying them again cannot help
     std::vector<Bits> well_off; // voxels whose sides are known from the start
 };
 
-// Voxels near the surface have leaves all around them. Without a leaf nothing is known.
+// Voxels near the surface have leaves all around them. Voxels without a leaf are unknown.
 void Settling::gather(const uint32_t around[27], Halo &halo) const {
-    const auto take_one = [&](uint32_t leaf, int x, int n, int to) {
+    const auto copy_voxel = [&](uint32_t leaf, int x, int n, int to) {
         const bool is_there = leaf != LeafTable::NONE;
         halo.distance[to] = is_there ? leaves[leaf].distances[64 * x + n] : 0.0f;
         const bool known = is_there && (fresh(leaf, size_t(x)) >> n & 1) != 0;
@@ -464,14 +466,14 @@ void Settling::gather(const uint32_t around[27], Halo &halo) const {
         for (int y = 0; y < EDGE; ++y) {
             const uint32_t *const from = around + 9 * part_of(x) + 3 * part_of(y);
             const int to = in_halo(x, y, 0), inner_x = (x + 7) & 7, row = 8 * ((y + 7) & 7);
-            take_one(from[0], inner_x, row + LEAF - 1, to);
-            take_one(from[2], inner_x, row, to + EDGE - 1);
+            copy_voxel(from[0], inner_x, row + LEAF - 1, to);
+            copy_voxel(from[2], inner_x, row, to + EDGE - 1);
             uint64_t sides = 0;
             if (from[1] != LeafTable::NONE) {
                 const uint64_t known = fresh(from[1], size_t(inner_x)) >> row & 0xff;
                 const uint64_t outside = known & now[from[1]].outside[inner_x] >> row;
                 sides = spread(outside) | spread(known & ~outside) * 0xff;
-                std::memcpy(halo.distance + to + 1, leaves[from[1]].distances + 64 * inner_x + row,
+                std::memcpy(halo.distance + to + 1, leaves[from[1]].distances.get() + 64 * inner_x + row,
                             LEAF * sizeof *halo.distance);
             } else {
                 std::fill_n(halo.distance + to + 1, LEAF, 0.0f);
@@ -491,7 +493,7 @@ void Settling::settle(size_t i) {
         return;
     }
     const uint32_t *const around = table.around(i);
-    // voxels without a neighbour of known side learn nothing now, and voxels on the surface never do
+    // skip voxels without a neighbour of known side, and voxels on the surface
     const Bits near_fresh = touching(around, [&](uint32_t leaf, size_t x) { return fresh(leaf, x); });
     for (size_t x = 0; x < LEAF; ++x) {
         left[x] &= near_fresh[x];
@@ -525,7 +527,7 @@ void Settling::end_round() {
     now.swap(next);
 }
 
-Sides Settling::tell(size_t i) const {
+Sides Settling::sides_of(size_t i) const {
     Sides sides{now[i].outside, {}};
     Bits near;
     for (size_t x = 0; x < LEAF; ++x) {
@@ -558,7 +560,7 @@ std::vector<Sides> find_sides(const Surface &surface, const LeafTable &table, do
         settling.end_round();
     }
     std::vector<Sides> sides(count);
-    stage.loop(count, 16, last, end, [&](size_t i) { sides[i] = settling.tell(i); });
+    stage.loop(count, 16, last, end, [&](size_t i) { sides[i] = settling.sides_of(i); });
     return sides;
 }
 

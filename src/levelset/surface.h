@@ -30,9 +30,9 @@ inline Corners corners_of(const Surface &surface, uint32_t triangle) {
             openvdb::Vec3d(surface.points[polygon[second + 1]])};
 }
 
-// Signed distances on the lattice, active within half_width (voxels, at least 3) of the surface: inside is
-// what cannot be reached from outside, whatever way the polygons face. Distances are exact to 1e-4 of a voxel
-// where the surface's points are.
+// Signed distances on the lattice, active within half_width (voxels, at least 3) of the surface. A voxel is
+// inside if no path leads to it from far away, whatever way the polygons face. Distances are exact to 1e-4 of
+// a voxel.
 FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, double half_width, double begin,
                             double end, Stage &stage);
 
@@ -42,44 +42,43 @@ FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, d
 
 // --- re-distancing
 
-// The distance to a surface, or less where it is none: voxels, at a place in index space; changes by at most
+// The distance to a surface, or a lower bound of it, at a place in index space; voxels. It changes by at most
 // 1 a voxel.
 using IndexDistance = std::function<double(const Vec3d &)>;
 
-// Peak memory of re-distancing: for a leaf of the source with its part of the mesh, and for a leaf of the
-// result with its distances. Measured over spheres and boxes at half widths of 3 to 30, the whole estimate is
-// 1.3 to 1.6 times the peak, without the 25 MB of the first threads.
+// Peak memory of re-distancing: a leaf of the source with its part of the mesh, and a leaf of the result with
+// its distances. Measured over spheres and boxes at half widths of 3 to 30, the whole estimate is 1.3 to 1.6
+// times the peak, without the 25 MB of the first threads.
 constexpr double SOURCE_BYTES_PER_LEAF = 1.5 * BYTES_PER_LEAF;
 constexpr double REDISTANCE_BYTES_PER_LEAF = 3.0 * BYTES_PER_LEAF;
 
-// Bytes of a grid's inner nodes beside those of a compact one (eight around the origin, 2.1 MB, and those
-// below them), which the estimates' margins hold: leaves far from each other have nodes of their own, 130
+// Bytes of a grid's inner nodes beyond those of a compact grid (eight around the origin, 2.1 MB, and the
+// nodes below), which the estimates' margins cover. Leaves far from each other have their own nodes, 130
 // times their size, in every copy on the way.
 inline double far_node_bytes(double grid_bytes, double leaves) {
     constexpr double COMPACT = 3e6;
     return std::max(0.0, grid_bytes - leaves * double(sizeof(Leaf)) - COMPACT);
 }
 
-// Throws Failure where re-distancing would pass the run's memory limit or the machine's: a surface of `area`
-// voxel² in a box of `sides` voxels, held in `source_leaves`, `held` bytes beside it.
+// Fails if re-distancing would exceed the run's memory limit or the machine's memory. The surface has `area`
+// voxel² in a box of `sides` voxels and lies in `source_leaves`; `held` bytes are in use.
 void check_redistance(const vsh_run &run, const Lattice &lattice, double area, const Vec3d &sides,
-                      double source_leaves, double held, vsh_error *error);
+                      double source_leaves, double held);
 
 // The zero surface of a grid as quads in its index space; voxels beside it must be active.
 Surface mesh_surface(const FloatGrid &source, Stage &stage);
 
-// A level set on the lattice with the zero surface and the signs of `source` (on the same lattice, with
-// values at least wherever neighbours differ in sign) and true distances: the surface is meshed and the mesh
-// measured. `exact`: the field that the source holds values of, by which edges and corners are kept; may be
-// empty.
+// A level set of true distances on the lattice, with the zero surface and the signs of `source`: the surface
+// is meshed and the mesh measured. `source` is on the same lattice, and has values wherever neighbours differ
+// in sign. `exact`, if not empty, is the field that `source` samples; it keeps edges and corners.
 FloatGrid::Ptr redistance(const FloatGrid &source, const IndexDistance &exact, const Lattice &lattice,
-                          double begin, double end, Stage &stage, vsh_error *error);
+                          double begin, double end, Stage &stage);
 
 // --- signs of tiles
 
 constexpr int32_t UPPER_SIZE = int32_t(UpperNode::DIM);
 
-// Sets the tiles of one node, each of which has one sign because no surface passes it.
+// Sets the tiles of one node. A tile has one sign, because no surface passes through it.
 template <typename Node, typename Inside> void sign_tiles(Node &node, Inside &&inside, float background) {
     for (auto tile = node.beginValueAll(); tile; ++tile) {
         tile.setValue(inside(tile.getCoord()) ? -background : background);
@@ -89,7 +88,7 @@ template <typename Node, typename Inside> void sign_tiles(Node &node, Inside &&i
     }
 }
 
-// Origins of the upper nodes and of the root's tiles of a tree.
+// Origins of a tree's upper nodes and of its root's tiles.
 inline std::vector<Coord> root_origins(const FloatTree &tree) {
     std::vector<Coord> origins;
     std::vector<const UpperNode *> nodes;
@@ -106,8 +105,9 @@ inline std::vector<Coord> root_origins(const FloatTree &tree) {
     return origins;
 }
 
-// Gives every tile of `tree` the sign that `make_inside()(first voxel)` tells, and the root a tile at each of
-// `origins` that lies inside and has no node. The tree has leaves wherever there is a surface.
+// Gives every tile of `tree` the sign of its first voxel, by the test that `make_inside()` makes. Adds a tile
+// to the root at each of `origins` that lies inside and has no node. The tree has leaves wherever there is a
+// surface.
 template <typename MakeInside>
 void fill_tiles(FloatTree &tree, const std::vector<Coord> &origins, float background, Stage &stage,
                 MakeInside &&make_inside) {
@@ -127,9 +127,9 @@ void fill_tiles(FloatTree &tree, const std::vector<Coord> &origins, float backgr
     }
 }
 
-// The signs of unsigned distances from a test of voxels; `origins` as above.
+// Gives unsigned distances the signs of a test of voxels; parameters as above.
 template <typename MakeInside>
-void take_signs(FloatGrid &distances, const std::vector<Coord> &origins, Stage &stage,
+void copy_signs(FloatGrid &distances, const std::vector<Coord> &origins, Stage &stage,
                 MakeInside &&make_inside) {
     std::vector<Leaf *> leaves;
     distances.tree().getNodes(leaves);

@@ -1,5 +1,6 @@
-// The union of grids: those on the new lattice are shifted by whole voxels, others are meshed, moved and
-// measured again; then each voxel takes the least value of all.
+// The union of grids. Grids on the new lattice are shifted by whole voxels; others are meshed, moved and
+// measured again. Then each voxel gets the least value of all.
+#include "base/vec.h"
 #include "levelset/surface.h"
 
 #include <cmath>
@@ -11,17 +12,16 @@ namespace vshi {
 
 namespace {
 
-constexpr double SAME_SIZE =
-    1e-9; // relative difference of voxel sizes that stays below the next, at any index
+// Relative difference of voxel sizes that moves no voxel by a whole one, at any index.
+constexpr double SAME_SIZE = 1e-9;
 constexpr double SAME_PLACE = 1e-3; // voxels by which a lattice may be off
 constexpr double UNEVEN = 1e-6;     // of an instance's axes, relative
 
-// An instance, and where its index space lies in the world: rows of four.
 struct Placed {
     const vsh_grid *grid;
-    double transform[12];
-    double scale; // of the instance
-    double voxel; // world units
+    double transform[12]; // from the grid's index space to the world: rows of four
+    double scale;         // of the instance
+    double voxel;         // world units
 };
 
 // A level set whose voxel `index - shift` is the union's voxel `index`.
@@ -30,12 +30,13 @@ struct Part {
     Coord shift;
 };
 
-Placed place(const vsh_grid_instance &instance, size_t number, vsh_error *error) {
-    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+constexpr double IDENTITY[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+Placed place(const vsh_grid_instance &instance, size_t number) {
     if (instance.grid == nullptr) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "unite: instance %zu has no grid", number)};
+        refuse(VSH_ERROR_ARGUMENT, "unite: instance %zu has no grid", number);
     }
-    const double *m = instance.transform != nullptr ? instance.transform : identity;
+    const double *m = instance.transform != nullptr ? instance.transform : IDENTITY;
     const Vec3d axis[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}};
     const double scale = axis[0].length();
     bool even = scale > 0.0 && std::isfinite(scale) && Vec3d(m[3], m[7], m[11]).isFinite();
@@ -44,11 +45,9 @@ Placed place(const vsh_grid_instance &instance, size_t number, vsh_error *error)
                std::fabs(axis[i].dot(axis[(i + 1) % 3])) <= UNEVEN * scale * scale;
     }
     if (!even) {
-        throw Failure{
-            vshi_fail(error, VSH_ERROR_ARGUMENT,
-                      "unite: instance %zu: axes of length %g, %g, %g: expected a rotation, mirroring "
-                      "and one scale",
-                      number, axis[0].length(), axis[1].length(), axis[2].length())};
+        refuse(VSH_ERROR_ARGUMENT,
+               "unite: instance %zu: axes of length %g, %g, %g: expected a rotation, mirroring and one scale",
+               number, axis[0].length(), axis[1].length(), axis[2].length());
     }
     Placed placed{instance.grid, {}, scale, scale * instance.grid->info.voxel_size};
     const double *g = instance.grid->info.transform;
@@ -68,7 +67,7 @@ Vec3d apply(const double *m, const Vec3d &p) {
                  m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
 }
 
-// Back through a rotation times the voxel size: its inverse is its transpose over the square.
+// Applies the inverse of a rotation times the voxel size: its transpose over the square.
 Vec3d apply_back(const Placed &placed, const Vec3d &world) {
     const double *m = placed.transform;
     const Vec3d p = (world - Vec3d(m[3], m[7], m[11])) / (placed.voxel * placed.voxel);
@@ -88,7 +87,7 @@ bool is_upright(const Placed &placed, double voxel) {
     return true;
 }
 
-// Whether the instance's voxels are voxels of the lattice, wide enough a band included; then by what shift.
+// Whether the instance's voxels are voxels of the lattice, shifted by `shift`, and its band is wide enough.
 bool lies_on(const Placed &placed, const Lattice &lattice, Coord &shift) {
     if (!is_upright(placed, lattice.voxel) ||
         placed.grid->info.half_width < lattice.half_width * (1.0 - 1e-5)) {
@@ -107,23 +106,18 @@ bool lies_on(const Placed &placed, const Lattice &lattice, Coord &shift) {
     return true;
 }
 
-// Corners of an instance's solid in the world.
+// Adds the corners of an instance's band, in the world.
 void grow_bounds(const Placed &placed, Vec3d &low, Vec3d &high) {
     const openvdb::CoordBBox box = placed.grid->level_set->evalActiveVoxelBoundingBox();
-    for (int corner = 0; corner < 8; ++corner) {
-        const Vec3d at = apply(placed.transform, Vec3d((corner & 1) ? box.max()[0] : box.min()[0],
-                                                       (corner & 2) ? box.max()[1] : box.min()[1],
-                                                       (corner & 4) ? box.max()[2] : box.min()[2]));
-        low = openvdb::math::minComponent(low, at);
-        high = openvdb::math::maxComponent(high, at);
-    }
+    const Vec3d from = box.min().asVec3d(), to = box.max().asVec3d();
+    vshi_grow_box_by(low.asPointer(), high.asPointer(), placed.transform, from.asPointer(), to.asPointer());
 }
 
-// The lattice of the union: that of the first instance which has its voxel size and stands upright, so that
-// at least this one is taken as it is.
-Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options *given, vsh_error *error) {
+// The lattice of the union: that of the first upright instance with the union's voxel size, so that at least
+// this one needs no resampling.
+Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options *given) {
     vsh_grid_options options = vsh_grid_options_default();
-    require(vshi_options_resolve(given, &options, sizeof options, "vsh_grid_options", error));
+    require(vshi_options_resolve, given, &options, sizeof options, "vsh_grid_options");
     Vec3d low(std::numeric_limits<double>::max());
     Vec3d high(-low);
     double finest = placed[0].voxel;
@@ -134,7 +128,7 @@ Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options
     if (options.voxel_size == 0.0) {
         options.voxel_size = finest;
     }
-    Lattice lattice = make_lattice(&options, low, high, error);
+    Lattice lattice = make_lattice(&options, low, high);
     for (const Placed &instance : placed) {
         const Vec3d origin(instance.transform[3], instance.transform[7], instance.transform[11]);
         double farthest = 0.0;
@@ -151,32 +145,29 @@ Lattice choose_lattice(const std::vector<Placed> &placed, const vsh_grid_options
     return lattice;
 }
 
-constexpr double COPIES = 5.0; // of far inner nodes that are there at a time, beside the instance's own
+constexpr double COPIES = 5.0; // of far inner nodes that exist at a time, beside the instance's own
 
-void foretell(const std::vector<Placed> &placed, const Lattice &lattice, const vsh_run &run,
-              vsh_error *error) {
-    double leaves = 0.0;
-    double bytes = 0.0;
+void check_union(const std::vector<Placed> &placed, const Lattice &lattice, const vsh_run &run) {
+    double leaves = 0.0, bytes = 0.0;
     for (const Placed &instance : placed) {
         const double finer = instance.voxel / lattice.voxel;
         const double count = double(instance.grid->level_set->tree().leafCount());
-        // what band_leaves() makes of a thin band, turned around
+        // the inverse of band_leaves() for a thin band
         const double area = count * double(Leaf::SIZE) / (2.0 * instance.grid->info.half_width + 12.0);
         const Vec3d sides = instance.grid->level_set->evalActiveVoxelDim().asVec3d();
         leaves += band_leaves(area * finer * finer, sides * finer, lattice.half_width);
         const double held = double(instance.grid->info.bytes);
         bytes += held + count * SOURCE_BYTES_PER_LEAF + COPIES * far_node_bytes(held, count);
     }
-    check_memory(&run, lattice.voxel, leaves, bytes + leaves * REDISTANCE_BYTES_PER_LEAF, error);
+    check_memory(run, lattice.voxel, leaves, bytes + leaves * REDISTANCE_BYTES_PER_LEAF);
 }
 
-// An instance measured on the lattice. Signs come from its own values, between which they are interpolated.
+// Measures an instance on the lattice. Signs come from its own values, by interpolation.
 FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &lattice, double begin, double end,
-                        Stage &stage, vsh_error *error) {
+                        Stage &stage) {
     Surface surface = mesh_surface(*placed.grid->level_set, stage);
     if (surface.polygons.empty()) {
-        throw Failure{
-            vshi_fail(error, VSH_ERROR_INPUT, "unite: instance %zu: the grid has no surface", number)};
+        refuse(VSH_ERROR_INPUT, "unite: instance %zu: the grid has no surface", number);
     }
     stage.loop(surface.points.size(), 4096, begin, begin, [&](size_t i) {
         const Vec3d point(surface.points[i]);
@@ -186,16 +177,9 @@ FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &latt
 
     // Upper nodes of the lattice that the instance's inside may cover without a surface.
     std::vector<Coord> origins;
-    const openvdb::CoordBBox box = measured->evalActiveVoxelBoundingBox();
-    const Coord first = box.min() & ~(UPPER_SIZE - 1);
-    for (int32_t x = first[0]; x <= box.max()[0]; x += UPPER_SIZE) {
-        for (int32_t y = first[1]; y <= box.max()[1]; y += UPPER_SIZE) {
-            for (int32_t z = first[2]; z <= box.max()[2]; z += UPPER_SIZE) {
-                origins.emplace_back(x, y, z);
-            }
-        }
-    }
-    take_signs(*measured, origins, stage, [&] {
+    visit_blocks(measured->evalActiveVoxelBoundingBox(), UPPER_SIZE,
+                 [&](const Coord &origin) { origins.push_back(origin); });
+    copy_signs(*measured, origins, stage, [&] {
         return
             [&, tree = FloatGrid::ConstUnsafeAccessor(placed.grid->level_set->constTree())](const Coord &at) {
                 const Vec3d source = apply_back(placed, lattice.world(at));
@@ -205,8 +189,8 @@ FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &latt
     return measured;
 }
 
-// Origins of the union's nodes that are `size` voxels wide: all that one of a part's nodes, whose origins
-// `list` tells, touches after its shift.
+// Origins of the union's nodes of `size` voxels: all that a part's nodes touch after the part's shift. `list`
+// gives the origins of a part's nodes.
 template <typename List>
 std::vector<Coord> shifted_origins(const std::vector<Part> &parts, int32_t size, const List &list) {
     const int32_t last = size - 1;
@@ -271,45 +255,40 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
     return united;
 }
 
-bool stands_as_it_is(const vsh_grid_instance &instance) {
-    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    return instance.transform == nullptr || std::equal(identity, identity + 12, instance.transform);
+bool is_identity(const double *transform) {
+    return transform == nullptr || std::equal(IDENTITY, IDENTITY + 12, transform);
 }
 
-vsh_result unite(const vsh_grid_instance *instances, size_t count, const vsh_grid_options *options,
-                 const vsh_run *given, vsh_grid **grid, vsh_error *error) {
-    vsh_run run;
-    VSHI_TRY(vshi_run_resolve(given, &run, error));
+vsh_grid *unite(const vsh_grid_instance *instances, size_t count, const vsh_grid_options *options,
+                const vsh_run &run) {
     if (instances == nullptr || count == 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unite: no grids");
+        refuse(VSH_ERROR_ARGUMENT, "unite: no grids");
     }
     std::vector<Placed> placed;
     for (size_t i = 0; i < count; ++i) {
-        placed.push_back(place(instances[i], i, error));
+        placed.push_back(place(instances[i], i));
     }
     const bool own_voxel = options == nullptr || options->voxel_size == 0.0;
-    if (count == 1 && own_voxel && stands_as_it_is(instances[0])) {
-        *grid = new vsh_grid(*instances[0].grid); // the tree is shared: no handle ever changes it
-        return VSH_OK;
+    if (count == 1 && own_voxel && is_identity(instances[0].transform)) {
+        return new vsh_grid(*instances[0].grid); // the tree is shared: no handle ever changes it
     }
-    const Lattice lattice = choose_lattice(placed, options, error);
-    foretell(placed, lattice, run, error);
-    Stage stage(run, "voxelize", error);
+    const Lattice lattice = choose_lattice(placed, options);
+    check_union(placed, lattice, run);
+    Stage stage(run, "voxelize");
     std::vector<Part> parts;
     double shell = 0.0;
     for (size_t i = 0; i < count; ++i) {
-        stage.check(); // meshing, the first step of resampling, asks nobody
+        stage.check(); // meshing, the first step of resampling, cannot be cancelled
         Part part{placed[i].grid->level_set, Coord(0)};
         if (!lies_on(placed[i], lattice, part.shift)) {
             part = {resample(placed[i], i, lattice, 0.9 * double(i) / double(count),
-                             0.9 * double(i + 1) / double(count), stage, error),
+                             0.9 * double(i + 1) / double(count), stage),
                     Coord(0)};
         }
         parts.push_back(part);
         shell = std::max(shell, placed[i].scale * placed[i].grid->info.shell_thickness);
     }
-    *grid = close_grid(unite_parts(parts, lattice, 0.9, stage), shell, stage);
-    return VSH_OK;
+    return close_grid(unite_parts(parts, lattice, 0.9, stage), shell, stage);
 }
 
 } // namespace
@@ -321,6 +300,7 @@ vsh_result vsh_grid_unite(const vsh_grid_instance *instances, size_t instance_co
                           vsh_error *error) {
     VSHI_NEEDS(grid);
     *grid = nullptr;
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "unite",
-                       [&] { return vshi::unite(instances, instance_count, options, run, grid, error); });
+    return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "unite", [&](const vsh_run &full) {
+        *grid = vshi::unite(instances, instance_count, options, full);
+    });
 }

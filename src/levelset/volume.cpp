@@ -1,5 +1,5 @@
-// Volumes: which voxels of which lattice are shaded (a level set's band, a box, another grid's active
-// voxels), the leaves that their values are put into block by block, and the trees made of them.
+// Volumes: the voxels to shade (a level set's band, a box, another grid's active voxels), the leaves that
+// hold their values, and the trees made of these.
 #include "levelset/file.h"
 
 #include <cmath>
@@ -13,9 +13,9 @@ namespace vshi {
 
 namespace {
 
-constexpr float BACKGROUND = 1.0f; // lit, and open: what was not shaded darkens nothing
+constexpr float BACKGROUND = 1.0f; // lit, and open: voxels that were not shaded darken nothing
 
-// What becomes of a block in one grid.
+// A block's values in one grid: a leaf, a tile, or none.
 struct Slot {
     std::unique_ptr<Leaf> leaf;
     float tile = 0.0f;
@@ -24,8 +24,8 @@ struct Slot {
 
 struct Channel {
     vshi_channel what;
-    std::vector<Slot> slots; // [blocks], while it is made
-    FloatTree::Ptr tree;     // afterwards
+    std::vector<Slot> slots; // [blocks]; empty once closed
+    FloatTree::Ptr tree;     // once closed
     vsh_volume_grid info{};
 };
 
@@ -57,12 +57,8 @@ namespace {
 
 // --- voxels
 
-bool comes_before(const vshi_block &a, const vshi_block &b) {
-    return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
-}
-
 constexpr double FARTHEST = 1e12;      // voxels from the origin: doubles must tell voxels apart there
-constexpr double ROUNDING = 1e-6;      // voxels: a side so much longer takes no voxel more
+constexpr double ROUNDING = 1e-6;      // voxels by which a box may be longer without another voxel
 constexpr double BAND_ROUNDING = 1e-6; // share of a band's width: the background is a float
 
 Vec3d centre_of(const VoxelSet &set, const int32_t index[3]) {
@@ -91,7 +87,8 @@ void grow_index_box(vsh_voxels_info &info, const vshi_block &block) {
     }
 }
 
-// The box of the centres: a frustum's map takes planes to planes, so that its corners are the box's too.
+// Sets the box of the centres; false if it is not finite. A frustum's map keeps planes, so the corners' box
+// holds all centres.
 bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
     const openvdb::CoordBBox indices{Coord(info.index_min), Coord(info.index_max)};
     const openvdb::BBoxd box = set.transform->indexToWorld(indices);
@@ -107,18 +104,15 @@ bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
     return finite;
 }
 
-// Whether memory allows for so many blocks.
-void check_blocks(const vsh_run &run, double count, const char *what, vsh_error *error) {
-    require(check_bytes(&run, count * double(sizeof(vshi_block)), what, error));
+void check_blocks(const vsh_run &run, double count, const char *what) {
+    check_bytes(run, count * double(sizeof(vshi_block)), what);
 }
 
-// Takes the set; `what` names it in messages.
-vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_error *error) {
+// Makes a handle; `what` names the voxels in messages.
+vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what) {
     vsh_voxels_info info{};
-    for (int axis = 0; axis < 3; ++axis) {
-        info.index_min[axis] = std::numeric_limits<int32_t>::max();
-        info.index_max[axis] = std::numeric_limits<int32_t>::min();
-    }
+    std::fill_n(info.index_min, 3, std::numeric_limits<int32_t>::max());
+    std::fill_n(info.index_max, 3, std::numeric_limits<int32_t>::min());
     for (const vshi_block &block : set.blocks) {
         for (const uint64_t word : block.mask) {
             info.count += uint64_t(__builtin_popcountll(word));
@@ -126,17 +120,16 @@ vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_err
         grow_index_box(info, block);
     }
     if (info.count == 0) {
-        throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: no active voxels", what)};
+        refuse(VSH_ERROR_INPUT, "%s: no active voxels", what);
     }
     for (int axis = 0; axis < 3; ++axis) {
         if (info.index_min[axis] < -LARGEST_INDEX || info.index_max[axis] > LARGEST_INDEX) {
-            throw Failure{vshi_fail(error, VSH_ERROR_INPUT, "%s: voxels %d to %d: indices may go to %d", what,
-                                    info.index_min[axis], info.index_max[axis], LARGEST_INDEX)};
+            refuse(VSH_ERROR_INPUT, "%s: voxels %d to %d: indices may go to %d", what, info.index_min[axis],
+                   info.index_max[axis], LARGEST_INDEX);
         }
     }
     if (!set_bounds(set, info)) {
-        throw Failure{
-            vshi_fail(error, VSH_ERROR_INPUT, "%s: its transform holds values that are not finite", what)};
+        refuse(VSH_ERROR_INPUT, "%s: its transform holds values that are not finite", what);
     }
     set.blocks.shrink_to_fit();
     info.blocks = set.blocks.size();
@@ -148,15 +141,14 @@ vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what, vsh_err
 
 // --- the band of a level set
 
-vsh_voxels *from_grid(const vsh_grid &grid, double band, const vsh_run &run, vsh_error *error) {
+vsh_voxels *from_grid(const vsh_grid &grid, double band, const vsh_run &run) {
     const double widest = grid.info.half_width;
     if (!(band >= 0.0 && band <= widest * (1.0 + BAND_ROUNDING))) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                "band of %g voxels: expected 0 … %g, the half width of the level set", band,
-                                widest)};
+        refuse(VSH_ERROR_ARGUMENT, "band of %g voxels: expected 0 … %g, the half width of the level set",
+               band, widest);
     }
     const FloatTree &tree = grid.level_set->constTree();
-    check_blocks(run, double(tree.leafCount()), "voxels of a band", error);
+    check_blocks(run, double(tree.leafCount()), "voxels of a band");
     const float most = float((band > 0.0 ? band : widest) * grid.info.voxel_size);
     VoxelSet set;
     set.transform = grid.level_set->transform().copy();
@@ -173,13 +165,13 @@ vsh_voxels *from_grid(const vsh_grid &grid, double band, const vsh_run &run, vsh
             set.blocks.push_back(block);
         }
     }
-    std::sort(set.blocks.begin(), set.blocks.end(), comes_before);
-    return close_voxels(std::move(set), true, "band", error);
+    std::sort(set.blocks.begin(), set.blocks.end(), comes_before<vshi_block>);
+    return close_voxels(std::move(set), true, "band");
 }
 
 // --- a box
 
-vshi_block box_block(const int32_t origin[3], const int32_t size[3]) {
+vshi_block box_block(const Coord &origin, const int32_t size[3]) {
     vshi_block block{{origin[0], origin[1], origin[2]}, {}};
     for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
         const bool within = origin[0] + (v >> 6) < size[0] && origin[1] + (v >> 3 & 7) < size[1] &&
@@ -189,53 +181,43 @@ vshi_block box_block(const int32_t origin[3], const int32_t size[3]) {
     return block;
 }
 
-vsh_voxels *from_box(const double low[3], const double high[3], double voxel, const vsh_run &run,
-                     vsh_error *error) {
+vsh_voxels *from_box(const double low[3], const double high[3], double voxel, const vsh_run &run) {
     if (!(voxel > 0.0 && std::isfinite(voxel))) {
-        throw Failure{
-            vshi_fail(error, VSH_ERROR_ARGUMENT, "box: voxel size %g: expected more than 0", voxel)};
+        refuse(VSH_ERROR_ARGUMENT, "box: voxel size %g: expected more than 0", voxel);
     }
     if (voxel < SMALLEST_WRITTEN || voxel > LARGEST_VOXEL) {
-        throw Failure{vshi_fail(error, VSH_ERROR_LIMIT, "box: voxel size %g: expected %g … %g", voxel,
-                                SMALLEST_WRITTEN, LARGEST_VOXEL)};
+        refuse(VSH_ERROR_LIMIT, "box: voxel size %g: expected %g … %g", voxel, SMALLEST_WRITTEN,
+               LARGEST_VOXEL);
     }
     int32_t size[3];
     double blocks = 1.0;
     for (int axis = 0; axis < 3; ++axis) {
         if (!(std::isfinite(low[axis]) && std::isfinite(high[axis]) && low[axis] < high[axis])) {
-            throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT,
-                                    "box: %g … %g along %c: expected finite bounds, the second above the "
-                                    "first",
-                                    low[axis], high[axis], "xyz"[axis])};
+            refuse(VSH_ERROR_ARGUMENT,
+                   "box: %g … %g along %c: expected finite bounds, the second above the first", low[axis],
+                   high[axis], "xyz"[axis]);
         }
         const double voxels = std::max(1.0, std::ceil((high[axis] - low[axis]) / voxel - ROUNDING));
         const double far = std::max(std::fabs(low[axis]), std::fabs(high[axis])) / voxel;
         if (!(voxels <= LARGEST_INDEX && far <= FARTHEST)) {
-            throw Failure{vshi_fail(error, VSH_ERROR_LIMIT,
-                                    "box: voxel size %g: %g voxels along %c, %g from the origin; at most %d "
-                                    "and %g",
-                                    voxel, voxels, "xyz"[axis], far, LARGEST_INDEX, FARTHEST)};
+            refuse(VSH_ERROR_LIMIT,
+                   "box: voxel size %g: %g voxels along %c, %g from the origin; at most %d and %g", voxel,
+                   voxels, "xyz"[axis], far, LARGEST_INDEX, FARTHEST);
         }
         size[axis] = int32_t(voxels);
         blocks *= std::ceil(voxels / 8.0);
     }
     char what[96];
     std::snprintf(what, sizeof what, "box of %d x %d x %d voxels", size[0], size[1], size[2]);
-    // with the values of one grid at least: what follows would be refused for it
-    require(check_bytes(&run, blocks * (double(sizeof(vshi_block)) + BYTES_PER_LEAF), what, error));
+    // with the values of one grid, without which the voxels are of no use
+    check_bytes(run, blocks * (double(sizeof(vshi_block)) + BYTES_PER_LEAF), what);
     VoxelSet set;
     set.transform = openvdb::math::Transform::createLinearTransform(voxel);
     set.transform->postTranslate(Vec3d(low[0], low[1], low[2]) + Vec3d(0.5 * voxel));
     set.blocks.reserve(size_t(blocks));
-    int32_t at[3];
-    for (at[0] = 0; at[0] < size[0]; at[0] += 8) {
-        for (at[1] = 0; at[1] < size[1]; at[1] += 8) {
-            for (at[2] = 0; at[2] < size[2]; at[2] += 8) {
-                set.blocks.push_back(box_block(at, size));
-            }
-        }
-    }
-    return close_voxels(std::move(set), false, what, error);
+    visit_blocks({Coord(0), Coord(size[0] - 1, size[1] - 1, size[2] - 1)}, 8,
+                 [&](const Coord &origin) { set.blocks.push_back(box_block(origin, size)); });
+    return close_voxels(std::move(set), false, what);
 }
 
 // --- another grid's active voxels
@@ -245,7 +227,6 @@ struct Topology {
     std::vector<vshi_block> &blocks;
     const vsh_run &run;
     const char *what;
-    vsh_error *error;
 
     template <typename GridType> void operator()(const GridType &grid) const {
         using Tree = typename GridType::TreeType;
@@ -259,7 +240,7 @@ struct Topology {
         for (auto tile = begin_tiles(); tile; ++tile) {
             count += double(tile.getVoxelCount()) / VSHI_BLOCK_VOXELS;
         }
-        check_blocks(run, count, what, error);
+        check_blocks(run, count, what);
         blocks.reserve(size_t(count));
         for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
             vshi_block block{{leaf->origin()[0], leaf->origin()[1], leaf->origin()[2]}, {}};
@@ -271,62 +252,42 @@ struct Topology {
             }
         }
         for (auto tile = begin_tiles(); tile; ++tile) {
-            const openvdb::CoordBBox box = tile.getBoundingBox();
-            for (int32_t x = box.min()[0]; x <= box.max()[0]; x += 8) {
-                for (int32_t y = box.min()[1]; y <= box.max()[1]; y += 8) {
-                    for (int32_t z = box.min()[2]; z <= box.max()[2]; z += 8) {
-                        vshi_block block{{x, y, z}, {}};
-                        std::fill(block.mask, block.mask + VSHI_MASK_WORDS, ~uint64_t(0));
-                        blocks.push_back(block);
-                    }
-                }
-            }
+            visit_blocks(tile.getBoundingBox(), 8, [&](const Coord &origin) {
+                vshi_block block{{origin[0], origin[1], origin[2]}, {}};
+                std::fill(block.mask, block.mask + VSHI_MASK_WORDS, ~uint64_t(0));
+                blocks.push_back(block);
+            });
         }
     }
 };
 
 // The blocks of a grid's active voxels, sorted.
-std::vector<vshi_block> blocks_of(const openvdb::GridBase &grid, const char *what, const vsh_run &run,
-                                  vsh_error *error) {
+std::vector<vshi_block> blocks_of(const openvdb::GridBase &grid, const char *what, const vsh_run &run) {
     std::vector<vshi_block> blocks;
-    grid.apply<NumberGrids>(Topology{blocks, run, what, error});
-    std::sort(blocks.begin(), blocks.end(), comes_before);
+    grid.apply<NumberGrids>(Topology{blocks, run, what});
+    std::sort(blocks.begin(), blocks.end(), comes_before<vshi_block>);
     return blocks;
 }
 
-vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run, vsh_error *error) {
-    Stage stage(run, "load", error);
+vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run) {
+    Stage stage(run, "load");
     stage.check();
     VoxelSet set;
-    Named named{path, ""};
+    GridName what{path, ""};
     if (run.reader != nullptr) {
         Answer answer(stage);
         const auto encode = [&](vshi_encoder *to) { vshi_encode_text(to, name); };
-        set.blocks = take_blocks(answer.ask(VSHI_READ_VOXELS, path, encode, error), path, named.grid,
-                                 set.transform, error);
-        check_blocks(run, double(set.blocks.size()), named.text().c_str(), error);
+        set.blocks =
+            decode_blocks(answer.ask(VSHI_READ_VOXELS, path, encode), path, what.grid, set.transform);
+        check_blocks(run, double(set.blocks.size()), what.text().c_str());
     } else {
-        const openvdb::GridBase::Ptr grid = read_numbers(path, name, run, error);
-        named.grid = grid->getName();
+        const openvdb::GridBase::Ptr grid = read_numbers(path, name, run);
+        what.grid = grid->getName();
         set.transform = grid->transform().copy();
-        set.blocks = blocks_of(*grid, named.text().c_str(), run, error);
+        set.blocks = blocks_of(*grid, what.text().c_str(), run);
         stage.check();
     }
-    return close_voxels(std::move(set), false, named.text().c_str(), error);
-}
-
-// The public calls: `make` gives the handle.
-template <typename Make>
-vsh_result make_voxels(const vsh_run *run, vsh_result code, const char *what, vsh_voxels **voxels,
-                       vsh_error *error, const Make &make) {
-    *voxels = nullptr;
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return guard(error, code, what, [&]() -> vsh_result {
-        initialize();
-        *voxels = make(full);
-        return VSH_OK;
-    });
+    return close_voxels(std::move(set), false, what.text().c_str());
 }
 
 // --- values
@@ -363,7 +324,7 @@ void grow_tree(Channel &channel, const VoxelSet &set) {
         if (slot.is_tile) {
             channel.tree->addTile(1, Coord(set.blocks[b].origin), slot.tile, true);
         } else if (slot.leaf != nullptr) {
-            channel.tree->addLeaf(slot.leaf.release()); // the tree's, also where it throws
+            channel.tree->addLeaf(slot.leaf.release()); // which owns it even if it throws
         }
     }
     std::vector<Slot>().swap(channel.slots);
@@ -388,10 +349,9 @@ FloatGrid::Ptr to_grid(const Channel &channel, const VoxelSet &set, bool as_half
     return grid;
 }
 
-const Channel &channel_of(const vsh_volume &volume, size_t grid, vsh_error *error) {
+const Channel &channel_of(const vsh_volume &volume, size_t grid) {
     if (grid >= volume.channels.size()) {
-        throw Failure{vshi_fail(error, VSH_ERROR_ARGUMENT, "grid %zu: the volume has %zu", grid,
-                                volume.channels.size())};
+        refuse(VSH_ERROR_ARGUMENT, "grid %zu: the volume has %zu", grid, volume.channels.size());
     }
     return volume.channels[grid];
 }
@@ -405,8 +365,8 @@ vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const vsh_run
     VSHI_NEEDS(voxels);
     *voxels = nullptr;
     VSHI_NEEDS(grid);
-    return vshi::make_voxels(run, VSH_ERROR_INTERNAL, "band", voxels, error,
-                             [&](const vsh_run &full) { return vshi::from_grid(*grid, band, full, error); });
+    return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "band",
+                           [&](const vsh_run &full) { *voxels = vshi::from_grid(*grid, band, full); });
 }
 
 vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
@@ -415,8 +375,9 @@ vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3],
     *voxels = nullptr;
     VSHI_NEEDS(box_min);
     VSHI_NEEDS(box_max);
-    return vshi::make_voxels(run, VSH_ERROR_INTERNAL, "box", voxels, error, [&](const vsh_run &full) {
-        return vshi::from_box(box_min, box_max, voxel_size, full, error);
+    return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "box", [&](const vsh_run &full) {
+        vshi::initialize();
+        *voxels = vshi::from_box(box_min, box_max, voxel_size, full);
     });
 }
 
@@ -425,21 +386,19 @@ vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run
     VSHI_NEEDS(voxels);
     *voxels = nullptr;
     VSHI_NEEDS(path);
-    return vshi::make_voxels(run, VSH_ERROR_READ, path, voxels, error,
-                             [&](const vsh_run &full) { return vshi::from_vdb(path, name, full, error); });
+    return vshi::guard_run(run, error, VSH_ERROR_READ, path,
+                           [&](const vsh_run &full) { *voxels = vshi::from_vdb(path, name, full); });
 }
 
 vsh_result vshi_serve_voxels(const char *path, vshi_decoder *request, const vsh_run *run,
                              vshi_encoder *payload, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_READ, path, [&]() -> vsh_result {
-        vshi::initialize();
+    return vshi::guard(error, VSH_ERROR_READ, path, [&] {
         const char *name = vshi_decode_text(request, false);
-        vshi::end_request(request, path, error);
-        const openvdb::GridBase::Ptr grid = vshi::read_numbers(path, name, *run, error);
-        const vshi::Named named{path, grid->getName()};
-        vshi::put_blocks(payload, named.grid, grid->transform(),
-                         vshi::blocks_of(*grid, named.text().c_str(), *run, error));
-        return VSH_OK;
+        vshi::end_request(request, path);
+        const openvdb::GridBase::Ptr grid = vshi::read_numbers(path, name, *run);
+        const vshi::GridName what{path, grid->getName()};
+        vshi::encode_blocks(payload, what.grid, grid->transform(),
+                            vshi::blocks_of(*grid, what.text().c_str(), *run));
     });
 }
 
@@ -451,7 +410,7 @@ void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
     *info = voxels->info;
 }
 
-void vsh_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]) {
+void vshi_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]) {
     const vshi::Vec3d at = vshi::centre_of(*voxels->set, index);
     std::copy(at.asPointer(), at.asPointer() + 3, centre);
 }
@@ -464,7 +423,7 @@ const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count) {
 size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]) {
     const auto &blocks = voxels->set->blocks;
     const vshi_block wanted{{origin[0], origin[1], origin[2]}, {}};
-    const auto at = std::lower_bound(blocks.begin(), blocks.end(), wanted, vshi::comes_before);
+    const auto at = std::lower_bound(blocks.begin(), blocks.end(), wanted, vshi::comes_before<vshi_block>);
     return at != blocks.end() && std::equal(at->origin, at->origin + 3, origin) ? size_t(at - blocks.begin())
                                                                                 : SIZE_MAX;
 }
@@ -481,7 +440,7 @@ void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, c
     for (size_t i = 0; i < count; ++i) {
         const int32_t at[3] = {origin[0] + (voxel[i] >> 6), origin[1] + (voxel[i] >> 3 & 7),
                                origin[2] + (voxel[i] & 7)};
-        vsh_voxels_centre(voxels, at, centres[i]);
+        vshi_voxels_centre(voxels, at, centres[i]);
     }
 }
 
@@ -500,14 +459,14 @@ void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], 
 
 vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *channels, size_t count,
                              const vsh_run *run, double held, vsh_volume **volume, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
         const size_t blocks = voxels->set->blocks.size();
         const double bytes =
             held + double(voxels->info.bytes) +
             double(blocks) * double(count) * (vshi::BYTES_PER_LEAF + double(sizeof(vshi::Slot)));
         const std::string what = std::to_string(count) + (count > 1 ? " grids" : " grid") + " of " +
                                  std::to_string(voxels->info.count) + " voxels";
-        VSHI_TRY(vshi::check_bytes(run, bytes, what.c_str(), error));
+        vshi::check_bytes(*run, bytes, what.c_str());
         auto made = std::make_unique<vsh_volume>();
         made->set = voxels->set;
         made->channels = std::vector<vshi::Channel>(count);
@@ -516,7 +475,6 @@ vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *chann
             made->channels[c].slots.resize(blocks);
         }
         *volume = made.release();
-        return VSH_OK;
     });
 }
 
@@ -551,7 +509,7 @@ void vshi_volume_settle(vsh_volume *volume, size_t block, const uint64_t mask[VS
 }
 
 vsh_result vshi_volume_close(vsh_volume *volume, const vsh_volume_info *counts, vsh_error *error) {
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
         volume->info = *counts;
         volume->info.grids = volume->channels.size();
         volume->info.bytes = 0;
@@ -559,7 +517,6 @@ vsh_result vshi_volume_close(vsh_volume *volume, const vsh_volume_info *counts, 
             vshi::grow_tree(channel, *volume->set);
             volume->info.bytes += channel.tree->memUsage();
         }
-        return VSH_OK;
     });
 }
 
@@ -576,26 +533,25 @@ void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid 
     *info = grid < volume->channels.size() ? volume->channels[grid].info : none;
 }
 
-vsh_result vsh_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
-                             float *values, vsh_error *error) {
+vsh_result vshi_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
+                              float *values, vsh_error *error) {
     VSHI_NEEDS(volume);
     VSHI_NEEDS_OF(count, positions);
     VSHI_NEEDS_OF(count, values);
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
-        const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
+        const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid).tree;
         const openvdb::tree::ValueAccessor<const vshi::FloatTree> at(tree);
         constexpr double FARTHEST = 2147483646.0;
         for (size_t i = 0; i < count; ++i) {
             const double *p = positions + 3 * i;
             const vshi::Vec3d index = volume->set->transform->worldToIndex(vshi::Vec3d(p[0], p[1], p[2]));
-            bool inside = true; // of what indices can say; false for NaN
+            bool inside = true; // the range of indices; false for NaN
             for (int axis = 0; axis < 3; ++axis) {
                 inside = inside && std::fabs(index[axis]) < FARTHEST;
             }
             values[i] = inside ? openvdb::tools::BoxSampler::sample(at, index)
                                : std::numeric_limits<float>::quiet_NaN();
         }
-        return VSH_OK;
     });
 }
 
@@ -605,10 +561,8 @@ vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t 
     VSHI_NEEDS(index_min);
     VSHI_NEEDS(size);
     VSHI_NEEDS(values);
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&]() -> vsh_result {
-        const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid, error).tree;
-        vshi::copy_dense(tree, index_min, size, values, error);
-        return VSH_OK;
+    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
+        vshi::copy_dense(*vshi::channel_of(*volume, grid).tree, index_min, size, values);
     });
 }
 
@@ -630,9 +584,8 @@ vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, uint32_t
     VSHI_NEEDS(volume);
     VSHI_NEEDS(values);
     return vshi::guard(error, VSH_ERROR_LIMIT, "OpenVDB", [&] {
-        vshi::check_openvdb(version, abi, error);
+        vshi::check_openvdb(version, abi);
         *static_cast<openvdb::FloatGrid::ConstPtr *>(values) =
-            vshi::to_grid(vshi::channel_of(*volume, grid, error), *volume->set, false);
-        return VSH_OK;
+            vshi::to_grid(vshi::channel_of(*volume, grid), *volume->set, false);
     });
 }

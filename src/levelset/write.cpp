@@ -1,6 +1,6 @@
 // Writing .vdb files: whole, or not at all, and the same bytes for the same grids.
-#include "base/attributes.h"
 #include "base/file.h"
+#include "base/text.h"
 #include "levelset/file.h"
 
 #include <cstdio>
@@ -14,7 +14,7 @@ namespace vshi {
 
 namespace {
 
-// Writes through a sink: OpenVDB's own file writing does not look whether the last bytes arrived.
+// Writes through a sink: OpenVDB's own file writing does not check that the last bytes were written.
 class SinkBuffer final : public std::streambuf {
   public:
     explicit SinkBuffer(const char *path) : sink(vshi_sink_open(path)), bytes(size_t(1) << 20) { flush(); }
@@ -45,7 +45,7 @@ class SinkBuffer final : public std::streambuf {
     pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode mode) override {
         flush();
         return from == std::ios_base::end
-                   ? pos_type(off_type(-1)) // nobody asks for it
+                   ? pos_type(off_type(-1)) // unused
                    : seekpos(offset + (from == std::ios_base::cur ? off_type(at) : 0), mode);
     }
 
@@ -72,10 +72,13 @@ class Writer final : public openvdb::io::Archive {
                         : hasZLibCompression() ? openvdb::io::COMPRESS_ZIP
                                                : openvdb::io::COMPRESS_NONE));
     }
-    void put(std::ostream &out, const openvdb::GridCPtrVec &grids) const { Archive::write(out, grids, true); }
+    void write_to(std::ostream &out, const openvdb::GridCPtrVec &grids) const {
+        Archive::write(out, grids, true);
+    }
 };
 
-// In place of OpenVDB's random one: the same grids give the same bytes. FNV-1a over the values.
+// The UUID of a file, from its values by FNV-1a. OpenVDB's own is random, but equal grids must give equal
+// bytes.
 class ContentHash {
   public:
     void add(uint64_t word) {
@@ -125,17 +128,16 @@ struct Output {
 
 vsh_result write_grids(const char *path, double voxel_size, const vsh_attribute *attributes, size_t count,
                        const std::function<std::vector<FloatGrid::Ptr>()> &make, vsh_error *error) {
-    return guard(error, VSH_ERROR_WRITE, path, [&]() -> vsh_result {
+    return guard(error, VSH_ERROR_WRITE, path, [&] {
         initialize();
-        VSHI_TRY(vshi_attributes_check(path, attributes, count, error));
+        require(vshi_attributes_check, path, attributes, count);
         if (!(voxel_size >= SMALLEST_WRITTEN)) {
-            return vshi_fail(error, VSH_ERROR_LIMIT,
-                             "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path,
-                             voxel_size, SMALLEST_WRITTEN);
+            refuse(VSH_ERROR_LIMIT, "%s: voxel size %g: OpenVDB writes %g and more; scale the scene", path,
+                   voxel_size, SMALLEST_WRITTEN);
         }
         const std::vector<FloatGrid::Ptr> grids = make();
         Output output;
-        VSHI_TRY(vshi_output_begin(&output.file, path, error));
+        require(vshi_output_begin, &output.file, path);
         ContentHash hash;
         for (const FloatGrid::Ptr &grid : grids) {
             for (size_t i = 0; i < count; ++i) {
@@ -145,16 +147,16 @@ vsh_result write_grids(const char *path, double voxel_size, const vsh_attribute 
         }
         SinkBuffer buffer(output.file.temporary);
         std::ostream stream(&buffer);
-        Writer().put(stream, openvdb::GridCPtrVec(grids.begin(), grids.end()));
+        Writer().write_to(stream, openvdb::GridCPtrVec(grids.begin(), grids.end()));
         stream.seekp(std::streamoff(UUID_AT));
         stream << hash.uuid();
         const bool good = stream.good();
         const int number = buffer.finish();
         if (number != 0 || !good) {
-            return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", path,
-                             number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
+            refuse(VSH_ERROR_WRITE, "%s: could not be written: %s", path,
+                   number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
         }
-        return vshi_output_commit(&output.file, error);
+        require(vshi_output_commit, &output.file);
     });
 }
 

@@ -1,35 +1,32 @@
-/* Rectangular area lights. What a point sees of one is weighed by solid angle, as of a sphere that shines
- * evenly: rays go over the rectangle as it is projected on the sphere of directions (C. Urena, M. Fajardo and
- * A. King, "An area-preserving parametrization for spherical rectangles", 2013), and methods of one march
- * take the disc of the same solid angle (A. van Oosterom and J. Strackee, "The solid angle of a plane
- * triangle", 1983). */
-#include "light/types.h"
+/* Rectangular area lights, measured by solid angle. Rays are uniform over the rectangle's projection on the
+ * sphere of directions (C. Urena, M. Fajardo and A. King, "An area-preserving parametrization for spherical
+ * rectangles", 2013). Methods of one march use the disc of the same solid angle (A. van Oosterom and J.
+ * Strackee, "The solid angle of a plane triangle", 1983). */
+#include "light/light.h"
 
 #include "base/error.h"
-#include "light/light.h"
 
 #include <stdio.h>
 
 static const double PI = 3.14159265358979323846;
 
-/* Sides' lengths, world units; cosine between the sides, at most. */
+/* Lengths of sides, world units; the largest cosine between the sides. */
 static const double SHORTEST = 1e-15, LONGEST = 1e15, SKEW = 1e-3;
 
-/* Of a softness of 0. */
+/* A softness of 0 scales by this. */
 static const double LEAST_FACTOR = 0x1p-20;
 
-/* Part of the way to the light that rays leave out, so that a surface which the light lies on does not hide
- * it. */
+/* Rays omit this part of the way, so that a surface under the light does not hide it. */
 static const double HAIR = 0x1p-14;
 
-/* Cones whose rim is closer than this to a right angle, by its cosine, hold too much for proofs. */
+/* Cones whose rim has a smaller cosine hold too much for proofs. */
 static const double WIDEST = 0.09;
 
-/* What cones for proofs are wider than the light, against rounding. */
+/* Proofs use cones wider by this part, against rounding. */
 static const double ROOM = 1e-6;
 
-/* Steradians below which rays go over the area alike: distances and cosines to its parts are then the same to
- * 3e-4, and angles of the projected sides lose what a double holds of them. */
+/* Below this angle, steradians, rays are uniform in area. Distances and cosines then agree to 3e-4, and
+ * doubles no longer hold the angles of the projected sides. */
 static const double SMALL = 1e-7;
 
 /* --- solid angles, with the point `height` over the rectangle's plane */
@@ -65,38 +62,32 @@ static double polygon_area(const flat_point *points, int count) {
     return fabs(sum);
 }
 
-/* --- the rectangle from a point */
-
-typedef struct seen {
-    double x[2], y[2]; /* sides, from the foot of the point in the plane */
-    double height;     /* of the point over the plane, ≥ 0 */
-    vshi_vec down;     /* unit, from the point's side to the plane */
-} seen;
-
-static seen see(const vshi_light_place *place, vshi_vec from, double *signed_height) {
+/* The patch without its constants. *over is the point's height above the plane, negative behind the light. */
+static vshi_light_patch see(const vshi_light_place *place, vshi_vec from, double *over) {
     const vshi_vec to = vshi_sub(place->centre, from);
     const double x = vshi_dot(to, place->x), y = vshi_dot(to, place->y);
-    *signed_height = -vshi_dot(to, place->normal);
-    return (seen){.x = {x - place->half_width, x + place->half_width},
-                  .y = {y - place->half_height, y + place->half_height},
-                  .height = fabs(*signed_height),
-                  .down = vshi_scale(place->normal, *signed_height < 0.0 ? 1.0 : -1.0)};
+    *over = -vshi_dot(to, place->normal);
+    return (vshi_light_patch){.x = {x - place->half_width, x + place->half_width},
+                              .y = {y - place->half_height, y + place->half_height},
+                              .height = fabs(*over),
+                              .down = vshi_scale(place->normal, *over < 0.0 ? 1.0 : -1.0)};
 }
 
-static void corners_of(const seen *s, flat_point corners[4]) {
+static void corners_of(const vshi_light_patch *s, flat_point corners[4]) {
     for (int i = 0; i < 4; ++i) { /* around */
         corners[i] = (flat_point){s->x[i == 1 || i == 2], s->y[i >= 2]};
     }
 }
 
-static vshi_vec turn(const vshi_light_place *place, const seen *s, flat_point p, double height) {
+/* The vector from the point to a place on the plane. */
+static vshi_vec turn(const vshi_light_place *place, const vshi_light_patch *s, flat_point p) {
     return vshi_add(vshi_add(vshi_scale(place->x, p.x), vshi_scale(place->y, p.y)),
-                    vshi_scale(s->down, height));
+                    vshi_scale(s->down, s->height));
 }
 
-/* Urena and others' constants for a point over the plane. */
-static void set_patch(const seen *s, vshi_light_patch *p) {
-    const double x0 = s->x[0], x1 = s->x[1], y0 = s->y[0], y1 = s->y[1], square = s->height * s->height;
+/* Sets the constants of Urena and others for a point above the plane. */
+static void set_constants(vshi_light_patch *p) {
+    const double x0 = p->x[0], x1 = p->x[1], y0 = p->y[0], y1 = p->y[1], square = p->height * p->height;
     const double n[4] = {-y0 / sqrt(square + y0 * y0), x1 / sqrt(square + x1 * x1),
                          y1 / sqrt(square + y1 * y1), -x0 / sqrt(square + x0 * x0)};
     double g[4];
@@ -109,19 +100,12 @@ static void set_patch(const seen *s, vshi_light_patch *p) {
     p->angle = g[0] + g[1] - p->k;
 }
 
-static vshi_light_side look_at_centre(const vshi_light_place *place, vshi_vec from, vshi_light_view *view) {
-    const vshi_vec to = vshi_sub(place->centre, from);
-    const double distance = vshi_length(to) * (1.0 - HAIR);
-    *view = (vshi_light_view){.axis = vshi_unit(to), .distance = distance, .near = distance, .end = distance};
-    return distance > 0.0 ? VSHI_LIGHT_SEEN : VSHI_LIGHT_WITHIN;
-}
-
-/* A cone around all four corners, about the mean of the ways to them. */
-static void bound(const vshi_light_place *place, const seen *s, const flat_point corners[4],
+/* Finds a cone around all four corners, about the mean direction to them. */
+static void bound(const vshi_light_place *place, const vshi_light_patch *s, const flat_point corners[4],
                   vshi_light_view *view) {
     vshi_vec way[4], sum = {0.0, 0.0, 0.0};
     for (int i = 0; i < 4; ++i) {
-        way[i] = turn(place, s, corners[i], s->height);
+        way[i] = turn(place, s, corners[i]);
         sum = vshi_add(sum, vshi_unit(way[i]));
     }
     view->axis = vshi_unit(sum);
@@ -141,14 +125,18 @@ static void bound(const vshi_light_place *place, const seen *s, const flat_point
     view->bound = cosine > WIDEST ? sine * (1.0 + ROOM) : INFINITY;
 }
 
-static vshi_light_side look(const vshi_light_place *place, vshi_vec from, bool hard, vshi_light_view *view) {
+vshi_light_side vshi_rectangle_look(const vshi_light_place *place, vshi_vec from, bool hard,
+                                    vshi_light_view *view) {
     double over;
-    const seen s = see(place, from, &over);
+    const vshi_light_patch s = see(place, from, &over);
     if (!place->two_sided && !(over > 0.0)) {
         return VSHI_LIGHT_AWAY;
     }
     if (hard) {
-        return look_at_centre(place, from, view);
+        const vshi_vec to = vshi_sub(place->centre, from);
+        const double end = vshi_length(to) * (1.0 - HAIR);
+        *view = (vshi_light_view){.axis = vshi_unit(to), .distance = end, .near = end, .end = end};
+        return end > 0.0 ? VSHI_LIGHT_SEEN : VSHI_LIGHT_WITHIN;
     }
     const bool within = s.x[0] < 0.0 && s.x[1] > 0.0 && s.y[0] < 0.0 && s.y[1] > 0.0;
     if (s.height <= 0.0 && within) {
@@ -158,26 +146,23 @@ static vshi_light_side look(const vshi_light_place *place, vshi_vec from, bool h
     corners_of(&s, corners);
     *view = (vshi_light_view){.axis = {0.0, 0.0, 0.0}};
     bound(place, &s, corners, view);
-    /* the disc of the same solid angle, and where its cone comes to the rectangle's plane */
+    /* the disc of the same solid angle; its cone ends at the plane of the rectangle */
     const double solid = polygon_angle(s.height, corners, 4), part = solid / (2.0 * PI);
     view->sine = vshi_light_sine(sqrt(part * (2.0 - part)));
     const double towards = vshi_dot(view->axis, s.down);
     const double end = s.height > 0.0 ? s.height / (towards + view->sine) : view->near;
     view->distance = end / (1.0 - view->sine * view->sine);
-    view->patch = (vshi_light_patch){.angle = 0.0};
+    view->patch = s;
     if (solid > SMALL) {
-        set_patch(&s, &view->patch);
+        set_constants(&view->patch);
     }
-    view->patch.x[0] = s.x[0], view->patch.x[1] = s.x[1];
-    view->patch.y[0] = s.y[0], view->patch.y[1] = s.y[1];
-    view->patch.height = s.height;
-    view->patch.down = s.down;
     return VSHI_LIGHT_SEEN;
 }
 
 /* --- rays */
 
-/* The unit disc to the unit square: back by the map of Shirley and Chiu (trace/sampler.c), areas kept. */
+/* Maps the unit disc to the unit square, the inverse of Shirley and Chiu (trace/sampler.c). It keeps areas.
+ */
 static void to_square(const double disc[2], double square[2]) {
     const double radius = sqrt(disc[0] * disc[0] + disc[1] * disc[1]);
     double x = 0.0, y = 0.0;
@@ -200,7 +185,7 @@ static double clamp(double value, const double ends[2]) {
     return fmin(fmax(value, ends[0]), ends[1]); /* of NaN the first */
 }
 
-/* A place on the rectangle that is uniform in solid angle. */
+/* Finds a place on the rectangle, uniform in solid angle. */
 static flat_point place_by_angle(const vshi_light_patch *p, const double square[2]) {
     const double turned = square[0] * p->angle + p->k, z = p->height;
     const double f = (vshi_cos(turned) * p->b0 - p->b1) / vshi_sin(turned);
@@ -214,7 +199,8 @@ static flat_point place_by_angle(const vshi_light_patch *p, const double square[
     return (flat_point){x, clamp(h * d / sqrt(fmax(1.0 - h * h, 1e-30)), p->y)};
 }
 
-static vshi_vec ray(const vshi_light_place *place, const vshi_light_view *view, const double disc[2]) {
+vshi_vec vshi_rectangle_ray(const vshi_light_place *place, const vshi_light_view *view,
+                            const double disc[2]) {
     const vshi_light_patch *p = &view->patch;
     double square[2];
     to_square(disc, square);
@@ -222,14 +208,12 @@ static vshi_vec ray(const vshi_light_place *place, const vshi_light_view *view, 
     if (p->angle > 0.0) {
         at = place_by_angle(p, square);
     }
-    const vshi_vec way = vshi_add(vshi_add(vshi_scale(place->x, at.x), vshi_scale(place->y, at.y)),
-                                  vshi_scale(p->down, p->height));
-    return vshi_scale(way, 1.0 - HAIR);
+    return vshi_scale(turn(place, p, at), 1.0 - HAIR);
 }
 
 /* --- horizons and sides */
 
-/* The part of the rectangle on the positive side of a line, which is at `level` of each corner. */
+/* Clips the rectangle to the positive side of a line, at `level` from each corner. */
 static int clip(const flat_point corners[4], const double level[4], flat_point kept[5]) {
     int count = 0;
     for (int i = 0; i < 4; ++i) {
@@ -246,13 +230,13 @@ static int clip(const flat_point corners[4], const double level[4], flat_point k
     return count;
 }
 
-static double above(const vshi_light_place *place, vshi_vec from, vshi_vec normal) {
+double vshi_rectangle_above(const vshi_light_place *place, vshi_vec from, vshi_vec normal) {
     double over, level[4];
-    const seen s = see(place, from, &over);
+    const vshi_light_patch s = see(place, from, &over);
     flat_point corners[4], kept[5];
     corners_of(&s, corners);
     for (int i = 0; i < 4; ++i) {
-        level[i] = vshi_dot(turn(place, &s, corners[i], s.height), normal);
+        level[i] = vshi_dot(turn(place, &s, corners[i]), normal);
     }
     const int count = clip(corners, level, kept);
     if (count < 3) {
@@ -264,11 +248,11 @@ static double above(const vshi_light_place *place, vshi_vec from, vshi_vec norma
     return fmin(part, 1.0);
 }
 
-static bool faces(const vshi_light_place *place, vshi_vec centre, double radius) {
+bool vshi_rectangle_faces(const vshi_light_place *place, vshi_vec centre, double radius) {
     return place->two_sided || vshi_dot(vshi_sub(centre, place->centre), place->normal) > radius;
 }
 
-static void move(vshi_light_place *place, const double matrix[12], double unit) {
+void vshi_rectangle_move(vshi_light_place *place, const double matrix[12], double unit) {
     place->x = vshi_unit(vshi_transform_vector(matrix, place->x));
     place->y = vshi_unit(vshi_transform_vector(matrix, place->y));
     place->normal = vshi_unit(vshi_transform_vector(matrix, place->normal));
@@ -279,12 +263,10 @@ static void move(vshi_light_place *place, const double matrix[12], double unit) 
 /* --- the row of the table */
 
 void vshi_rectangle_place(const vsh_light *light, vshi_light_place *place) {
-    static const vshi_light_shape shape = {
-        .move = move, .look = look, .ray = ray, .above = above, .faces = faces};
     const vshi_vec u = vshi_vec_of(light->edge_u), v = vshi_vec_of(light->edge_v), x = vshi_unit(u);
     const vshi_vec y = vshi_unit(vshi_sub(v, vshi_scale(x, vshi_dot(v, x))));
     *place = (vshi_light_place){.centre = vshi_vec_of(light->position),
-                                .shape = &shape,
+                                .is_rectangle = true,
                                 .x = x,
                                 .y = y,
                                 .normal = vshi_cross(x, y),
@@ -294,8 +276,8 @@ void vshi_rectangle_place(const vsh_light *light, vshi_light_place *place) {
     place->radius = sqrt(place->half_width * place->half_width + place->half_height * place->half_height);
 }
 
-/* A plane surface shines by the cosine; by the inverse square each part of it on its own, which comes to the
- * solid angle over the area. */
+/* A plane surface shines by the cosine. The inverse square, integrated over its parts, is the solid angle
+ * over the area. */
 double vshi_rectangle_gain(const vsh_light *light, vshi_vec to_light, double distance) {
     vshi_light_place place;
     vshi_rectangle_place(light, &place);
@@ -307,7 +289,7 @@ double vshi_rectangle_gain(const vsh_light *light, vshi_vec to_light, double dis
         return facing * vshi_light_falloff(light, distance);
     }
     double over;
-    const seen s = see(&place, vshi_sub(place.centre, vshi_scale(to_light, distance)), &over);
+    const vshi_light_patch s = see(&place, vshi_sub(place.centre, vshi_scale(to_light, distance)), &over);
     flat_point corners[4];
     corners_of(&s, corners);
     return polygon_angle(s.height, corners, 4) / (4.0 * place.half_width * place.half_height);

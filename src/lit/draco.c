@@ -1,3 +1,4 @@
+/* Primitives under KHR_draco_mesh_compression, decoded whole: every attribute in the type of its accessor. */
 #include "lit/work.h"
 
 #include "base/memory.h"
@@ -8,17 +9,18 @@
 
 static const char extension_name[] = "KHR_draco_mesh_compression";
 
-const vshi_lit_draco *vshi_lit_draco_of(const vshi_lit_dracos *dracos, size_t mesh, size_t primitive) {
-    for (size_t i = 0; i < dracos->count; ++i) {
-        if (dracos->list[i].mesh == mesh && dracos->list[i].primitive == primitive) {
-            return &dracos->list[i];
+const vshi_lit_draco *vshi_lit_find_draco(const vshi_lit_work *work, size_t mesh, size_t primitive) {
+    for (size_t i = 0; i < work->dracos.count; ++i) {
+        const vshi_lit_draco *draco = &work->dracos.list[i];
+        if (draco->mesh == mesh && draco->primitive == primitive) {
+            return draco;
         }
     }
     return NULL;
 }
 
-const vshi_lit_draco_attribute *vshi_lit_draco_attribute_of(const vshi_lit_draco *draco,
-                                                            const json_t *primitive, const char *name) {
+const vshi_lit_draco_attribute *vshi_lit_find_draco_attribute(const vshi_lit_draco *draco,
+                                                              const json_t *primitive, const char *name) {
     const json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
     size_t id;
     if (!vshi_gltf_count(names, name, SIZE_MAX, &id) || id == SIZE_MAX) {
@@ -50,10 +52,10 @@ void vshi_lit_dracos_free(vshi_lit_dracos *dracos) {
 
 /* --- decoding */
 
-static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *mesh, const json_t *primitive,
-                                 const char *name, const char *where, vshi_lit_draco_attribute *attribute,
-                                 vsh_error *error) {
-    vshi_gltf *gltf = &document->gltf;
+static vsh_result decode_attribute(vshi_lit_work *work, const vshi_draco *mesh, const json_t *primitive,
+                                   const char *name, const char *where, vshi_lit_draco_attribute *attribute,
+                                   vsh_error *error) {
+    vshi_gltf *gltf = &work->gltf;
     const json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
     vshi_gltf_accessor accessor;
     size_t id, index;
@@ -64,7 +66,7 @@ static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *
     }
     VSHI_TRY(vshi_gltf_accessor_open(gltf, index, &accessor, error));
     *attribute = (vshi_lit_draco_attribute){id, accessor.type, accessor.components, NULL};
-    const size_t size = (size_t)accessor.components * sizeof(float); /* at most, of a component */
+    const size_t size = (size_t)accessor.components * sizeof(float); /* no component is larger */
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&attribute->values, mesh->vertex_count, size, error));
     return accessor.components <= 4 &&
                    vshi_importers()->draco_elements(mesh, (uint32_t)id, accessor.type, accessor.components,
@@ -74,44 +76,46 @@ static vsh_result take_attribute(vshi_lit_document *document, const vshi_draco *
                                 where, id, accessor.components);
 }
 
-static vsh_result take(vshi_lit_document *document, const vshi_draco *mesh, json_t *primitive,
-                       const char *where, vshi_lit_draco *draco, vsh_error *error) {
+static vsh_result decode_arrays(vshi_lit_work *work, const vshi_draco *mesh, const json_t *primitive,
+                                const char *where, vshi_lit_draco *draco, vsh_error *error) {
     json_t *names = json_object_get(vshi_gltf_extension(primitive, extension_name), "attributes");
     draco->vertex_count = mesh->vertex_count;
     draco->triangle_count = mesh->triangle_count;
-    VSHI_TRY(vshi_gltf_draco_indices(&document->gltf, mesh, where, &draco->indices, error));
-    VSHI_TRY(vshi_gltf_allocate(&document->gltf, (void **)&draco->attributes, json_object_size(names),
+    VSHI_TRY(vshi_gltf_draco_indices(&work->gltf, mesh, where, &draco->indices, error));
+    VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&draco->attributes, json_object_size(names),
                                 sizeof *draco->attributes, error));
     const char *name;
     json_t *value;
     json_object_foreach(names, name, value) {
         vshi_lit_draco_attribute *attribute = &draco->attributes[draco->attribute_count++];
-        VSHI_TRY(take_attribute(document, mesh, primitive, name, where, attribute, error));
+        VSHI_TRY(decode_attribute(work, mesh, primitive, name, where, attribute, error));
     }
     return VSH_OK;
 }
 
-static vsh_result decode(vshi_lit_document *document, json_t *primitive, vshi_lit_draco *draco,
-                         vsh_error *error) {
+static vsh_result decode_primitive(vshi_lit_work *work, vshi_lit_draco *draco, vsh_error *error) {
+    const json_t *of = vshi_gltf_element(&work->gltf, "meshes", draco->mesh);
+    const json_t *primitive = json_array_get(json_object_get(of, "primitives"), draco->primitive);
     char where[96];
     snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", draco->mesh, draco->primitive);
     vshi_draco *mesh = NULL;
-    VSHI_TRY(vshi_gltf_decode_draco(&document->gltf, vshi_gltf_extension(primitive, extension_name), where,
-                                    &mesh, error));
-    const vsh_result result = take(document, mesh, primitive, where, draco, error);
+    VSHI_TRY(vshi_gltf_decode_draco(&work->gltf, vshi_gltf_extension(primitive, extension_name), where, &mesh,
+                                    error));
+    const vsh_result result = decode_arrays(work, mesh, primitive, where, draco, error);
     vshi_importers()->draco_free(mesh);
     return result;
 }
 
-/* All primitives under Draco, listed by their places. */
-static vsh_result list(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
+/* Lists the places of all primitives under Draco. */
+static vsh_result list_places(vshi_lit_work *work, vsh_error *error) {
+    vshi_lit_dracos *dracos = &work->dracos;
     size_t m, p, capacity = 0;
     const json_t *mesh, *primitive;
-    json_array_foreach(json_object_get(document->gltf.root, "meshes"), m, mesh) {
+    json_array_foreach(json_object_get(work->gltf.root, "meshes"), m, mesh) {
         json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
             if (vshi_gltf_extension(primitive, extension_name) != NULL) {
                 VSHI_TRY(vshi_make_room((void **)&dracos->list, dracos->count, &capacity,
-                                        sizeof *dracos->list, document->gltf.path, error));
+                                        sizeof *dracos->list, work->gltf.path, error));
                 dracos->list[dracos->count++] = (vshi_lit_draco){.mesh = m, .primitive = p};
             }
         }
@@ -119,17 +123,12 @@ static vsh_result list(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh
     return VSH_OK;
 }
 
-static json_t *primitive_of(const vshi_lit_document *document, const vshi_lit_draco *draco) {
-    const json_t *mesh = vshi_gltf_element(&document->gltf, "meshes", draco->mesh);
-    return json_array_get(json_object_get(mesh, "primitives"), draco->primitive);
-}
-
-static vsh_result decode_all(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
-    for (size_t i = 0; i < dracos->count; ++i) {
-        if (vshi_job_cancelled(document->gltf.job)) {
-            return vshi_job_fail_cancelled(document->gltf.job, error);
+static vsh_result decode_all(vshi_lit_work *work, vsh_error *error) {
+    for (size_t i = 0; i < work->dracos.count; ++i) {
+        if (vshi_job_cancelled(work->gltf.job)) {
+            return vshi_job_fail_cancelled(work->gltf.job, error);
         }
-        VSHI_TRY(decode(document, primitive_of(document, &dracos->list[i]), &dracos->list[i], error));
+        VSHI_TRY(decode_primitive(work, &work->dracos.list[i], error));
     }
     return VSH_OK;
 }
@@ -139,19 +138,14 @@ static vsh_result decode_all(vshi_lit_document *document, vshi_lit_dracos *draco
 vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_run *run,
                             vshi_encoder *payload, vsh_error *error) {
     (void)request;
-    vshi_lit_document document;
-    vshi_lit_dracos dracos = {.list = NULL};
-    vshi_job *job = vshi_job_begin(run, "load", 1);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    }
+    vshi_lit_work work = {.gltf = {.path = path, .run = run, .job = vshi_job_begin(run, "load", 1)}};
     vsh_result result;
-    VSHI_TRY_DONE(vshi_lit_open(&document, path, run, job, error));
-    VSHI_TRY_DONE(list(&document, &dracos, error));
-    VSHI_TRY_DONE(decode_all(&document, &dracos, error));
-    vshi_encode_count(payload, dracos.count);
-    for (size_t i = 0; i < dracos.count; ++i) {
-        const vshi_lit_draco *draco = &dracos.list[i];
+    VSHI_TRY_DONE(work.gltf.job != NULL ? vshi_lit_open(&work, error) : vshi_lit_fail_memory(&work, error));
+    VSHI_TRY_DONE(list_places(&work, error));
+    VSHI_TRY_DONE(decode_all(&work, error));
+    vshi_encode_count(payload, work.dracos.count);
+    for (size_t i = 0; i < work.dracos.count; ++i) {
+        const vshi_lit_draco *draco = &work.dracos.list[i];
         vshi_encode_count(payload, draco->vertex_count);
         vshi_encode_count(payload, draco->triangle_count);
         vshi_encode_array(payload, draco->indices, draco->triangle_count, sizeof(uint32_t[3]));
@@ -164,16 +158,15 @@ vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_r
         }
     }
 done:
-    vshi_lit_dracos_free(&dracos);
-    vshi_lit_close(&document);
-    vshi_job_end(job);
+    vshi_job_end(work.gltf.job);
+    vshi_lit_work_free(&work);
     return result;
 }
 
 /* --- the caller */
 
-static vsh_result take_decoded(vshi_decoder *decoder, const char *path, vshi_lit_draco *draco,
-                               vsh_error *error) {
+static vsh_result read_primitive(vshi_decoder *decoder, const char *path, vshi_lit_draco *draco,
+                                 vsh_error *error) {
     enum { MOST_ATTRIBUTES = 4096 };
     draco->vertex_count = vshi_decode_count(decoder, UINT32_MAX);
     draco->triangle_count = vshi_decode_count(decoder, SIZE_MAX / 64);
@@ -214,25 +207,19 @@ vsh_result vshi_lit_dracos_decode(vshi_decoder *decoder, const char *path, vshi_
         return vshi_answer_fail(path, "the number of its compressed meshes", error);
     }
     for (size_t i = 0; i < dracos->count; ++i) {
-        VSHI_TRY(take_decoded(decoder, path, &dracos->list[i], error));
+        VSHI_TRY(read_primitive(decoder, path, &dracos->list[i], error));
     }
     return vshi_decoder_ends(decoder) ? VSH_OK : vshi_answer_fail(path, "its end", error);
 }
 
-static vsh_result ask_reader(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
-    const vshi_gltf *gltf = &document->gltf;
+vsh_result vshi_lit_read_dracos(vshi_lit_work *work, vsh_error *error) {
+    const vshi_gltf *gltf = &work->gltf;
     vshi_exchange exchange;
-    VSHI_TRY(vshi_exchange_begin(&exchange, VSHI_READ_DRACO, gltf->path, gltf->run, error));
-    VSHI_TRY(vshi_exchange_send_job(&exchange, gltf->job, 0, &dracos->answer, error));
-    return vshi_lit_dracos_decode(&dracos->answer.payload, gltf->path, dracos, error);
-}
-
-vsh_result vshi_lit_dracos_read(vshi_lit_document *document, vshi_lit_dracos *dracos, vsh_error *error) {
-    *dracos = (vshi_lit_dracos){.list = NULL};
-    VSHI_TRY(list(document, dracos, error));
-    if (dracos->count == 0) {
-        return VSH_OK;
+    VSHI_TRY(list_places(work, error));
+    if (work->dracos.count == 0 || gltf->run->reader == NULL) {
+        return decode_all(work, error);
     }
-    return document->gltf.run->reader != NULL ? ask_reader(document, dracos, error)
-                                              : decode_all(document, dracos, error);
+    VSHI_TRY(vshi_exchange_begin(&exchange, VSHI_READ_DRACO, gltf->path, gltf->run, error));
+    VSHI_TRY(vshi_exchange_send_job(&exchange, gltf->job, 0, &work->dracos.answer, error));
+    return vshi_lit_dracos_decode(&work->dracos.answer.payload, gltf->path, &work->dracos, error);
 }

@@ -1,14 +1,13 @@
+/* vsh_lit_write(): its checks and its steps. */
 #include "lit/work.h"
 
-#include "base/attributes.h"
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
+#include "base/text.h"
 #include "base/threads.h"
-#include "base/utf8.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -42,7 +41,7 @@ static vsh_result check_charts(const vshi_lit_work *work, const vsh_lit_mesh *li
         return fail_mesh(index, "page", 0, lit->page, work->page_count, error);
     }
     for (size_t t = 0; lit->charts != NULL && t < lit->triangle_count; ++t) {
-        if (lit->charts[t] != VSH_LIT_NO_CHART && lit->charts[t] >= work->options->chart_count) {
+        if (lit->charts[t] != VSH_NO_CHART && lit->charts[t] >= work->options->chart_count) {
             return fail_mesh(index, "charts", t, lit->charts[t], work->options->chart_count, error);
         }
     }
@@ -159,12 +158,29 @@ static vsh_result check_images(const vsh_lit_options *options, vsh_error *error)
     return VSH_OK;
 }
 
+/* Refuses images that an OBJ cannot show. */
+static vsh_result check_obj(const vshi_lit_work *work, vsh_error *error) {
+    const vsh_lit_options *options = work->options;
+    if (options->image_place == VSH_LIT_IMAGES_EMBED) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: an OBJ holds no images; they stand beside it",
+                         work->output);
+    }
+    for (size_t i = 0; i < options->image_count; ++i) {
+        if (options->images[i].purpose != VSH_LIT_PREVIEW) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "%s: image %zu: materials of an OBJ show a preview, and no other image",
+                             work->output, i);
+        }
+    }
+    return VSH_OK;
+}
+
 /* --- provenance in the extras of the asset */
 
 static const char OURS[] = "vdbshade_";
 
 /* Removes the notes of an earlier bake. */
-static void forget(json_t *extras) {
+static void remove_notes(json_t *extras) {
     const char *key;
     json_t *value;
     void *next;
@@ -175,36 +191,23 @@ static void forget(json_t *extras) {
     }
 }
 
-/* Names of files may be of any bytes. NULL where memory is short. */
-static json_t *text_of(const char *value) {
-    char *clean = malloc(3 * strlen(value) + 1);
-    if (clean == NULL) {
-        return NULL;
-    }
-    vshi_utf8_clean(value, clean);
-    json_t *made = json_string(clean);
-    free(clean);
-    return made;
-}
-
-/* The options' attributes into the extras of the asset. */
+/* Adds the options' attributes to the extras of the asset. */
 static vsh_result add_origin(vshi_lit_work *work, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
     const vsh_lit_options *options = work->options;
     json_t *asset, *extras;
     if (options->attribute_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_lit_object(document, document->gltf.root, "asset", &asset, error));
+    VSHI_TRY(vshi_lit_find_object(work, work->gltf.root, "asset", &asset, error));
     extras = json_object_get(asset, "extras");
     if (extras != NULL && !json_is_object(extras)) {
-        return VSH_OK; /* somebody's own, of another kind */
+        return VSH_OK; /* another program's, of another kind */
     }
-    VSHI_TRY(vshi_lit_object(document, asset, "extras", &extras, error));
-    forget(extras);
+    VSHI_TRY(vshi_lit_find_object(work, asset, "extras", &extras, error));
+    remove_notes(extras);
     for (size_t i = 0; i < options->attribute_count; ++i) {
         const vsh_attribute *one = &options->attributes[i];
-        vshi_lit_set(document, extras, one->name, text_of(one->value));
+        vshi_lit_set(work, extras, one->name, vshi_lit_text(one->value));
     }
     return VSH_OK;
 }
@@ -215,13 +218,12 @@ int32_t vsh_lit_is_output(const char *path) {
 
 /* --- resolving options */
 
-/* The set that vsh_model_mesh() takes for -1, of each mesh, on page 0. */
-static vsh_result default_meshes(const vsh_model *model, vsh_lit_mesh **meshes, vsh_error *error) {
+/* Lights each mesh by the set that vsh_model_mesh() chooses for -1, on page 0. */
+static vsh_result make_default_meshes(const vsh_model *model, vsh_lit_mesh **meshes, vsh_error *error) {
     const size_t count = vsh_model_mesh_count(model);
     VSHI_TRY(vshi_allocate((void **)meshes, count, sizeof **meshes, "a lit model", error));
     for (size_t i = 0; i < count; ++i) {
-        const int32_t sets = vsh_model_uv_sets(model, i);
-        const int32_t set = sets > 1 ? 1 : 0;
+        const int32_t set = vsh_model_uv_sets(model, i) > 1 ? 1 : 0;
         (*meshes)[i].uv_set = vsh_model_mesh(model, i, set).uvs != NULL ? set : -1;
     }
     return VSH_OK;
@@ -255,7 +257,7 @@ static vsh_result check_output(const vshi_lit_work *work, vsh_error *error) {
                          work->output);
     }
     if (vshi_lit_is_obj(work->output)) {
-        VSHI_TRY(vshi_lit_obj_check(work, error));
+        VSHI_TRY(check_obj(work, error));
     }
     VSHI_TRY(vshi_output_check(work->output, error));
     VSHI_TRY(check_images(work->options, error));
@@ -263,9 +265,9 @@ static vsh_result check_output(const vshi_lit_work *work, vsh_error *error) {
                                  error);
 }
 
-/* --- the document */
+/* --- making the document */
 
-/* Draco's data is needed where a mesh gets new UVs. */
+/* Only meshes with new UVs need Draco's data. */
 static bool has_new_uvs(const vshi_lit_work *work) {
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
         if (work->meshes[i].uvs != NULL) {
@@ -275,41 +277,26 @@ static bool has_new_uvs(const vshi_lit_work *work) {
     return false;
 }
 
-/* Images that the input names stay named where the output stands beside it. */
-static vsh_result bring_images(vshi_lit_work *work, vsh_error *error) {
-    if (work->document.own_images == NULL) {
-        return VSH_OK;
-    }
-    char *one = vshi_path_beside(work->path, ".", 1), *other = vshi_path_beside(work->output, ".", 1);
-    const bool known = one != NULL && other != NULL, beside = known && vshi_lit_is_same_file(one, other);
-    free(one);
-    free(other);
-    return !known   ? vshi_lit_no_memory(&work->document, error)
-           : beside ? VSH_OK
-                    : vshi_lit_images_bring(work, error);
-}
-
 static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error) {
-    const char *path = work->path;
+    const char *path = work->model_path;
     const bool obj = vshi_lit_is_obj(work->output);
     if (path != NULL && vshi_lit_is_same_file(path, work->output)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: the output is the input", work->output);
     }
     if (path == NULL || !vshi_is_gltf(path) || obj) {
-        VSHI_TRY(
-            vshi_lit_begin(&work->document, path != NULL ? path : work->output, work->run, work->job, error));
+        VSHI_TRY(vshi_lit_begin(work, error));
         return obj ? VSH_OK : vshi_lit_from_model(work, error);
     }
-    VSHI_TRY(vshi_lit_open(&work->document, path, work->run, work->job, error));
+    VSHI_TRY(vshi_lit_open(work, error));
     if (has_new_uvs(work)) {
-        VSHI_TRY(vshi_lit_dracos_read(&work->document, &work->dracos, error));
+        VSHI_TRY(vshi_lit_read_dracos(work, error));
     }
-    VSHI_TRY(vshi_lit_uses_find(&work->document, uses, error));
-    VSHI_TRY(vshi_lit_materials_check(work, error));
-    return vshi_lit_nodes_make(work, error);
+    VSHI_TRY(vshi_lit_find_uses(work, uses, error));
+    VSHI_TRY(vshi_lit_check_materials(work, error));
+    return vshi_lit_make_nodes(work, error);
 }
 
-static vsh_result make(void *user, vsh_error *error) {
+static vsh_result write_all(void *user, vsh_error *error) {
     vshi_lit_work *work = user;
     vshi_lit_besides besides = {NULL, 0};
     vshi_lit_uses uses = {.count = {0}};
@@ -317,76 +304,56 @@ static vsh_result make(void *user, vsh_error *error) {
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
     vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_check_limit(work->run, (double)work->page_count * sizeof *work->pages, work->output, error));
+    VSHI_TRY_DONE(vshi_check_limit(work->gltf.run, (double)work->page_count * sizeof *work->pages,
+                                   work->output, error));
     VSHI_TRY_DONE(
         vshi_allocate((void **)&work->pages, work->page_count, sizeof *work->pages, "pages", error));
     VSHI_TRY_DONE(make_document(work, &uses, error));
-    VSHI_TRY_DONE(vshi_lit_images_add(work, embed, &besides, error));
+    VSHI_TRY_DONE(vshi_lit_add_images(work, embed, &besides, error));
     if (!vshi_lit_is_obj(work->output)) {
-        VSHI_TRY_DONE(vshi_lit_materials_apply(work, error));
-        VSHI_TRY_DONE(vshi_lit_prune(&work->document, &uses, error));
-        VSHI_TRY_DONE(bring_images(work, error)); /* there may be fewer now */
+        VSHI_TRY_DONE(vshi_lit_apply_materials(work, error));
+        VSHI_TRY_DONE(vshi_lit_prune(work, &uses, error));
+        VSHI_TRY_DONE(vshi_lit_bring_images(work, error)); /* fewer, once pruned */
         VSHI_TRY_DONE(add_origin(work, error));
     }
-    VSHI_TRY_DONE(work->document.refused ? vshi_lit_no_memory(&work->document, error)
-                                         : vshi_lit_write_files(work, &besides, error));
+    result = work->refused ? vshi_lit_fail_memory(work, error) : vshi_lit_write_files(work, &besides, error);
 done:
     vshi_lit_uses_free(&uses);
     vshi_lit_besides_free(&besides);
     return result;
 }
 
-static void free_work(vshi_lit_work *work) {
-    for (size_t i = 0; i < work->uv_count; ++i) {
-        free(work->uvs[i].set);
-    }
-    free(work->uvs);
-    free(work->splits);
-    free(work->copies);
-    for (size_t i = 0; i < work->looks.count; ++i) {
-        json_decref(work->looks.list[i].transform);
-    }
-    free(work->looks.list);
-    vshi_lit_dracos_free(&work->dracos);
-    free(work->pages);
-    vshi_lit_close(&work->document);
-}
-
 /* --- room for new UVs */
 
-static vsh_result try_mesh(vshi_lit_work *work, size_t entry, vsh_error *error) {
+static vsh_result check_set(vshi_lit_work *work, size_t entry, vsh_error *error) {
     const vshi_model_origin *origin = &work->model->entries[entry].origin;
     const size_t mesh = (size_t)origin->mesh - 1, primitive = (size_t)origin->primitive - 1;
-    const json_t *of = vshi_gltf_element(&work->document.gltf, "meshes", mesh);
-    json_t *copy =
-        vshi_lit_copy_json(&work->document, json_array_get(json_object_get(of, "primitives"), primitive));
+    const json_t *of = vshi_gltf_element(&work->gltf, "meshes", mesh);
+    json_t *copy = vshi_lit_copy_json(work, json_array_get(json_object_get(of, "primitives"), primitive));
     char where[96];
     size_t set;
     snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);
     const vsh_result result = vshi_lit_choose_set(work, copy, &work->meshes[entry], where, &set, error);
     json_decref(copy);
-    return work->document.refused ? vshi_lit_no_memory(&work->document, error) : result;
+    return work->refused ? vshi_lit_fail_memory(work, error) : result;
 }
 
-static vsh_result try_all(void *user, vsh_error *error) {
+static vsh_result check_sets(void *user, vsh_error *error) {
     vshi_lit_work *work = user;
-    const char *path = work->path;
-    bool opened = false;
-    for (size_t i = 0; path != NULL && vshi_is_gltf(path) && i < vsh_model_mesh_count(work->model); ++i) {
+    const bool gltf = work->model_path != NULL && vshi_is_gltf(work->model_path);
+    for (size_t i = 0; gltf && i < vsh_model_mesh_count(work->model); ++i) {
         if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
             continue;
         }
-        if (!opened) {
-            VSHI_TRY(vshi_lit_open(&work->document, path, work->run, work->job, error));
-            opened = true;
+        if (work->text == NULL) {
+            VSHI_TRY(vshi_lit_open(work, error));
         }
-        VSHI_TRY(try_mesh(work, i, error));
+        VSHI_TRY(check_set(work, i, error));
     }
     return VSH_OK;
 }
 
-/* Images need not be there where it is only looked for UVs. */
+/* Planes may be missing when only UVs are checked. */
 static vsh_result check_purposes(const vsh_lit_options *options, vsh_error *error) {
     for (size_t i = 0; i < options->image_count; ++i) {
         if (options->images[i].purpose < 0 || options->images[i].purpose >= VSH_LIT_PURPOSES) {
@@ -397,7 +364,9 @@ static vsh_result check_purposes(const vsh_lit_options *options, vsh_error *erro
     return VSH_OK;
 }
 
-/* Writes the lit model, or (`output` NULL) looks whether its new UVs have room. */
+/* --- the calls */
+
+/* Writes the lit model or, with `output` NULL, checks that its new UVs have room. */
 static vsh_result process(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                           const vsh_lit_options *options, const char *output, const vsh_run *run,
                           vsh_error *error) {
@@ -408,37 +377,37 @@ static vsh_result process(const char *path, const vsh_model *model, const vsh_li
     vsh_lit_mesh *made = NULL;
     const size_t count = vsh_model_mesh_count(model);
     if (meshes == NULL) {
-        VSHI_TRY(default_meshes(model, &made, error));
+        VSHI_TRY(make_default_meshes(model, &made, error));
     }
     vshi_lit_work work = {.model = model,
+                          .model_path = path,
                           .meshes = meshes != NULL ? meshes : made,
                           .options = &own,
                           .output = output,
-                          .path = path,
-                          .run = &full};
+                          .gltf = {.path = path != NULL ? path : output, .run = &full}};
     vsh_result result;
     VSHI_TRY_DONE(output != NULL ? check_output(&work, error) : check_purposes(&own, error));
     VSHI_TRY_DONE(count_pages(&work, error));
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY_DONE(check_mesh(&work, i, error));
     }
-    work.job = vshi_job_begin(&full, "lit", output != NULL ? count + 1 : 1);
-    if (work.job == NULL) {
+    work.gltf.job = vshi_job_begin(&full, "lit", output != NULL ? count + 1 : 1);
+    if (work.gltf.job == NULL) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory"));
     }
-    VSHI_TRY_DONE(vshi_on_stack(output != NULL ? make : try_all, &work, error));
+    VSHI_TRY_DONE(vshi_on_stack(output != NULL ? write_all : check_sets, &work, error));
     if (output != NULL) {
-        vshi_job_advance(work.job, 1); /* all is written: too late to stop */
+        vshi_job_advance(work.gltf.job, 1); /* all is written: too late to stop */
     }
 done:
-    vshi_job_end(work.job);
-    free_work(&work);
+    vshi_job_end(work.gltf.job);
+    vshi_lit_work_free(&work);
     free(made);
     return result;
 }
 
-vsh_result vsh_lit_check_uvs(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                             const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
+vsh_result vshi_lit_check_free_set(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                                   const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(model);
     VSHI_NEEDS(meshes);

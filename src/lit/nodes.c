@@ -1,5 +1,5 @@
-/* Nodes, and the meshes that they show: one of its own for each where their UVs differ, and a node for each
- * instance of EXT_mesh_gpu_instancing. */
+/* Nodes and their meshes. A node whose UVs differ from those of others gets its own mesh, and an instance of
+ * EXT_mesh_gpu_instancing its own node. */
 #include "lit/work.h"
 
 #include <math.h>
@@ -12,28 +12,29 @@ typedef struct use {
     size_t node, mesh;
     size_t instance;     /* SIZE_MAX: the node has none */
     size_t first, count; /* entries */
-    bool lit, keeps;     /* some of it is lit; no primitive gets new UVs */
+    bool lit;            /* some primitives are lit */
+    bool keeps;          /* no primitive gets new UVs */
     size_t made;         /* the mesh that it shows in the end */
 } use;
 
 typedef struct uses {
-    use *list;
+    use *list; /* one block with the arrays below */
     size_t count;
-    size_t *unlit;    /* [mesh_count]: how many others show each mesh as it is */
-    json_t **changed; /* [mesh_count]: what each becomes; NULL: stays */
+    size_t *unlit;    /* [mesh_count]: how many nodes show each mesh as it is */
+    json_t **changed; /* [mesh_count]: the changed mesh; NULL: it stays */
     size_t mesh_count;
 } uses;
 
-/* --- who shows what */
+/* --- uses of meshes */
 
 static vsh_result fail_entry(const vshi_lit_work *work, size_t entry, vsh_error *error) {
     return vshi_gltf_fail(
-        &work->document.gltf, error,
+        &work->gltf, error,
         "mesh %zu of the model is none of its nodes': the file has changed since it was read", entry);
 }
 
 static vsh_result check_entry(const vshi_lit_work *work, size_t entry, const use *u, vsh_error *error) {
-    const vshi_gltf *gltf = &work->document.gltf;
+    const vshi_gltf *gltf = &work->gltf;
     const vshi_model_origin *origin = &work->model->entries[entry].origin;
     const json_t *node = vshi_gltf_element(gltf, "nodes", u->node);
     const json_t *primitives = json_object_get(vshi_gltf_element(gltf, "meshes", u->mesh), "primitives");
@@ -45,7 +46,7 @@ static vsh_result check_entry(const vshi_lit_work *work, size_t entry, const use
     return good ? VSH_OK : fail_entry(work, entry, error);
 }
 
-/* Whether entry e goes on with what u begins: the next primitive of it. */
+/* Whether entry e is the next primitive of a use. */
 static bool continues(const vshi_lit_work *work, const use *u, size_t e) {
     const vshi_model_origin *before = &work->model->entries[e - 1].origin;
     const vshi_model_origin *origin = &work->model->entries[e].origin;
@@ -53,8 +54,8 @@ static bool continues(const vshi_lit_work *work, const use *u, size_t e) {
            origin->mesh == before->mesh && origin->primitive > before->primitive;
 }
 
-/* Each node comes once, its instances in their order. */
-static bool comes_once(const uses *all, const use *u, bool *seen) {
+/* Whether a use is the first of its node, or its next instance. */
+static bool is_next(const uses *all, const use *u, bool *seen) {
     const use *before = all->count > 0 ? &all->list[all->count - 1] : NULL;
     if (before != NULL && before->node == u->node) {
         return before->instance != SIZE_MAX && u->instance != SIZE_MAX && u->instance > before->instance;
@@ -66,7 +67,7 @@ static bool comes_once(const uses *all, const use *u, bool *seen) {
 
 static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_error *error) {
     const size_t count = vsh_model_mesh_count(work->model);
-    const size_t nodes = json_array_size(json_object_get(work->document.gltf.root, "nodes"));
+    const size_t nodes = json_array_size(json_object_get(work->gltf.root, "nodes"));
     for (size_t e = 0; e < count; ++e) {
         const vshi_model_origin *origin = &work->model->entries[e].origin;
         use *last = all->count > 0 ? &all->list[all->count - 1] : NULL;
@@ -76,7 +77,7 @@ static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_erro
                               .instance = origin->instance > 0 ? (size_t)origin->instance - 1 : SIZE_MAX,
                               .first = e,
                               .keeps = true};
-            if (origin->node == 0 || next.node >= nodes || !comes_once(all, &next, seen)) {
+            if (origin->node == 0 || next.node >= nodes || !is_next(all, &next, seen)) {
                 return fail_entry(work, e, error);
             }
             last = &all->list[all->count++];
@@ -90,10 +91,10 @@ static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_erro
     return VSH_OK;
 }
 
-/* How often a node shows its mesh: once, or for all instances. That is the length of any of its accessors,
- * which the model found alike. */
+/* How often a node shows its mesh: once, or for all instances. All accessors of instances have one length, as
+ * the model's reader has checked. */
 static vsh_result count_instances(vshi_lit_work *work, const use *u, size_t *count, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
+    vshi_gltf *gltf = &work->gltf;
     const json_t *attributes = json_object_get(
         vshi_gltf_extension(vshi_gltf_element(gltf, "nodes", u->node), instancing_name), "attributes");
     *count = u->instance == SIZE_MAX ? 1 : 0;
@@ -106,9 +107,9 @@ static vsh_result count_instances(vshi_lit_work *work, const use *u, size_t *cou
     return VSH_OK;
 }
 
-/* Counts the showings of each mesh as it is: by nodes that the model does not have, or that stay unlit. */
+/* Counts how often each mesh is shown as it is, by nodes that stay unlit or that the model does not have. */
 static vsh_result count_unlit(vshi_lit_work *work, uses *all, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
+    vshi_gltf *gltf = &work->gltf;
     size_t n;
     const json_t *node;
     json_array_foreach(json_object_get(gltf->root, "nodes"), n, node) {
@@ -132,7 +133,8 @@ static vsh_result count_unlit(vshi_lit_work *work, uses *all, vsh_error *error) 
 
 /* --- meshes */
 
-/* An earlier use that shows the same: none gets UVs of its own, and the pages and sets are alike. */
+/* An earlier use without new UVs that shows the same primitives on the same pages by the same sets, or NULL.
+ */
 static const use *find_alike(const vshi_lit_work *work, const uses *all, const use *u) {
     for (const use *other = all->list; other < u && u->keeps; ++other) {
         bool alike = other->lit && other->keeps && other->mesh == u->mesh && other->count == u->count;
@@ -151,51 +153,50 @@ static const use *find_alike(const vshi_lit_work *work, const uses *all, const u
 
 static vsh_result make_primitives(vshi_lit_work *work, const use *u, json_t *list, vsh_error *error) {
     const json_t *primitives =
-        json_object_get(vshi_gltf_element(&work->document.gltf, "meshes", u->mesh), "primitives");
+        json_object_get(vshi_gltf_element(&work->gltf, "meshes", u->mesh), "primitives");
     size_t next = u->first;
     for (size_t p = 0; p < json_array_size(primitives); ++p) {
         if (next < u->first + u->count && work->model->entries[next].origin.primitive == p + 1) {
-            VSHI_TRY(vshi_lit_primitive_make(work, u->mesh, p, next, list, error));
+            VSHI_TRY(vshi_lit_make_primitive(work, u->mesh, p, next, list, error));
             ++next;
         } else {
-            vshi_lit_push(&work->document, list,
-                          vshi_lit_copy_json(&work->document, json_array_get(primitives, p)));
+            vshi_lit_push(work, list, vshi_lit_copy_json(work, json_array_get(primitives, p)));
         }
     }
     return VSH_OK;
 }
 
 static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
     const use *alike = find_alike(work, all, u);
     if (alike != NULL) {
         u->made = alike->made;
         return VSH_OK;
     }
-    json_t *mesh = vshi_lit_copy_json(document, vshi_gltf_element(&document->gltf, "meshes", u->mesh));
+    json_t *mesh = vshi_lit_copy_json(work, vshi_gltf_element(&work->gltf, "meshes", u->mesh));
     json_t *list = json_array();
     const vsh_result result = make_primitives(work, u, list, error);
-    vshi_lit_set(document, mesh, "primitives", list);
+    vshi_lit_set(work, mesh, "primitives", list);
     if (result != VSH_OK) {
         json_decref(mesh);
         return result;
     }
     if (all->unlit[u->mesh] == 0 && all->changed[u->mesh] == NULL) {
-        all->changed[u->mesh] = mesh; /* put there when all have been made of what it was */
+        all->changed[u->mesh] = mesh; /* replaced later: others are still made of the old one */
         u->made = u->mesh;
     } else {
-        u->made = vshi_lit_append(document, "meshes", mesh);
+        u->made = vshi_lit_append(work, "meshes", mesh);
     }
     return VSH_OK;
 }
 
 /* --- instances */
 
-static json_t *numbers(vshi_lit_document *document, const float *values, int part) {
+/* A part of an instance's transform. */
+static json_t *list_part(vshi_lit_work *work, const float *values, int part) {
     enum { ROTATION = 1 };
     static const double unit_slack = 1e-5;
     double scale = 1.0, scaled[4];
-    if (part == ROTATION) { /* integers are not quite of unit length, and viewers want that */
+    if (part == ROTATION) { /* viewers want unit length, which integers only approach */
         double square = 0.0;
         for (int c = 0; c < 4; ++c) {
             square += (double)values[c] * (double)values[c];
@@ -208,37 +209,41 @@ static json_t *numbers(vshi_lit_document *document, const float *values, int par
     for (int c = 0; c < vshi_gltf_parts[part].components; ++c) {
         scaled[c] = (double)values[c] * scale;
     }
-    return vshi_lit_numbers(document, scaled, (size_t)vshi_gltf_parts[part].components);
+    return vshi_lit_list_numbers(work, scaled, (size_t)vshi_gltf_parts[part].components);
 }
 
 static void add_instance(vshi_lit_work *work, const json_t *node, size_t node_index, size_t instance,
                          size_t mesh, float *const values[VSHI_GLTF_PARTS], json_t *children) {
-    vshi_lit_document *document = &work->document;
     const char *given = json_string_value(json_object_get(node, "name"));
     json_t *name = given != NULL && given[0] != '\0' ? json_sprintf("%s[%zu]", given, instance)
                                                      : json_sprintf("nodes[%zu][%zu]", node_index, instance);
     json_t *made = json_pack("{s:o,s:I}", "name", name, "mesh", (json_int_t)mesh);
-    vshi_lit_push(document, children, json_integer((json_int_t)vshi_lit_append(document, "nodes", made)));
+    vshi_lit_push(work, children, json_integer((json_int_t)vshi_lit_append(work, "nodes", made)));
     for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
         if (values[k] != NULL) {
             const float *own = values[k] + (size_t)vshi_gltf_parts[k].components * instance;
-            vshi_lit_set(document, made, vshi_gltf_parts[k].key, numbers(document, own, k));
+            vshi_lit_set(work, made, vshi_gltf_parts[k].key, list_part(work, own, k));
         }
     }
     const json_t *weights = json_object_get(node, "weights");
     if (weights != NULL) {
-        vshi_lit_set(document, made, "weights", vshi_lit_copy_json(document, weights));
+        vshi_lit_set(work, made, "weights", vshi_lit_copy_json(work, weights));
     }
 }
 
-/* Instances become children of their node; `first` … `end` - 1 are those that the model has. */
-static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t first, size_t end,
-                                json_t *children, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
+/* Makes the instances of a node its children. The model has the uses `first` … `end` - 1. */
+static vsh_result expand(vshi_lit_work *work, const uses *all, size_t first, size_t end, vsh_error *error) {
+    vshi_gltf *gltf = &work->gltf;
     const use *of = &all->list[first];
-    const json_t *node = vshi_gltf_element(gltf, "nodes", of->node);
+    json_t *node = json_array_get(json_object_get(gltf->root, "nodes"), of->node);
+    json_t *children = json_object_get(node, "children");
     float *values[VSHI_GLTF_PARTS] = {NULL};
     size_t count;
+    if (children == NULL) {
+        children = json_array();
+        vshi_lit_set(work, node, "children", children);
+        children = json_object_get(node, "children");
+    }
     vsh_result result = vshi_gltf_read_instances(gltf, vshi_gltf_extension(node, instancing_name),
                                                  instancing_name, values, &count, error);
     for (size_t i = 0, next = first; result == VSH_OK && i < count; ++i) {
@@ -251,27 +256,14 @@ static vsh_result add_instances(vshi_lit_work *work, const uses *all, size_t fir
     for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
         free(values[k]);
     }
-    return result;
-}
-
-static vsh_result expand(vshi_lit_work *work, const uses *all, size_t first, size_t end, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
-    json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), all->list[first].node);
-    json_t *children = json_object_get(node, "children");
-    if (children == NULL) {
-        children = json_array();
-        vshi_lit_set(document, node, "children", children);
-    }
-    VSHI_TRY(add_instances(work, all, first, end, children, error));
     vshi_lit_remove_extension(node, instancing_name);
     json_object_del(node, "mesh");
     json_object_del(node, "weights");
-    return VSH_OK;
+    return result;
 }
 
-/* A node's uses, `first` … `end` - 1, have their meshes. */
-static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_t end, vsh_error *error) {
-    vshi_lit_document *document = &work->document;
+/* Gives a node, which has the uses `first` … `end` - 1, its mesh. */
+static vsh_result set_mesh(vshi_lit_work *work, const uses *all, size_t first, size_t end, vsh_error *error) {
     const use *of = &all->list[first];
     bool any = false, same = true;
     size_t wanted;
@@ -286,13 +278,13 @@ static vsh_result give(vshi_lit_work *work, const uses *all, size_t first, size_
     if (!same || end - first != wanted) {
         return expand(work, all, first, end, error);
     }
-    json_t *node = json_array_get(json_object_get(document->gltf.root, "nodes"), of->node);
-    vshi_lit_set_number(document, node, "mesh", of->made);
+    json_t *node = json_array_get(json_object_get(work->gltf.root, "nodes"), of->node);
+    vshi_lit_set_number(work, node, "mesh", of->made);
     return VSH_OK;
 }
 
 static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
+    vshi_gltf *gltf = &work->gltf;
     for (size_t i = 0; i < all->count; ++i) {
         if (vshi_job_advance(gltf->job, all->list[i].count)) {
             return vshi_job_fail_cancelled(gltf->job, error);
@@ -305,44 +297,33 @@ static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
         for (end = first + 1; end < all->count && all->list[end].node == all->list[first].node;) {
             ++end;
         }
-        VSHI_TRY(give(work, all, first, end, error));
+        VSHI_TRY(set_mesh(work, all, first, end, error));
     }
     json_t *meshes = json_object_get(gltf->root, "meshes");
     for (size_t m = 0; m < all->mesh_count; ++m) {
-        work->document.refused |= all->changed[m] != NULL && json_array_set(meshes, m, all->changed[m]) != 0;
+        work->refused |= all->changed[m] != NULL && json_array_set(meshes, m, all->changed[m]) != 0;
     }
     return VSH_OK;
 }
 
-vsh_result vshi_lit_nodes_make(vshi_lit_work *work, vsh_error *error) {
-    vshi_gltf *gltf = &work->document.gltf;
-    const size_t nodes = json_array_size(json_object_get(gltf->root, "nodes"));
-    uses all = {.mesh_count = json_array_size(json_object_get(gltf->root, "meshes"))};
-    bool *seen = NULL;
+vsh_result vshi_lit_make_nodes(vshi_lit_work *work, vsh_error *error) {
+    const size_t nodes = json_array_size(json_object_get(work->gltf.root, "nodes"));
+    uses all = {.mesh_count = json_array_size(json_object_get(work->gltf.root, "meshes"))};
+    bool *seen;
+    const vshi_array arrays[] = {VSHI_ARRAY(all.list, vsh_model_mesh_count(work->model)),
+                                 VSHI_ARRAY(all.unlit, all.mesh_count),
+                                 VSHI_ARRAY(all.changed, all.mesh_count), VSHI_ARRAY(seen, nodes)};
     vsh_result result;
-    const struct {
-        void *memory;
-        size_t count, size;
-    } wanted[] = {{&all.list, vsh_model_mesh_count(work->model), sizeof *all.list},
-                  {&all.unlit, all.mesh_count, sizeof *all.unlit},
-                  {&all.changed, all.mesh_count, sizeof *all.changed},
-                  {&seen, nodes, sizeof *seen}};
-    for (size_t i = 0; i < sizeof wanted / sizeof wanted[0]; ++i) {
-        VSHI_TRY_DONE(
-            vshi_gltf_allocate(gltf, (void **)wanted[i].memory, wanted[i].count, wanted[i].size, error));
-    }
+    VSHI_TRY(VSHI_LIT_ALLOCATE(work, arrays, error));
     VSHI_TRY_DONE(list_uses(work, seen, &all, error));
     VSHI_TRY_DONE(count_unlit(work, &all, error));
     VSHI_TRY_DONE(make_all(work, &all, error));
-    vshi_lit_drop_extension(&work->document, instancing_name);
-    vshi_lit_drop_extension(&work->document, "KHR_draco_mesh_compression");
+    vshi_lit_drop_extension(work, instancing_name);
+    vshi_lit_drop_extension(work, "KHR_draco_mesh_compression");
 done:
-    for (size_t m = 0; all.changed != NULL && m < all.mesh_count; ++m) {
+    for (size_t m = 0; m < all.mesh_count; ++m) {
         json_decref(all.changed[m]);
     }
-    free(seen);
-    free(all.changed);
-    free(all.unlit);
     free(all.list);
     return result;
 }

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 
 vsh_result vshi_alpha_mask_check(const vsh_mesh *mesh, size_t index, vsh_error *error) {
-    enum { LARGEST = 1 << 16 }; /* so that all texels can be counted in 32 bits, but for one */
+    enum { LARGEST = 1 << 16 }; /* counts of texels must fit in 32 bits */
     const vsh_alpha_mask *mask = mesh->mask;
     if (mask == NULL) {
         return VSH_OK;
@@ -24,8 +24,7 @@ vsh_result vshi_alpha_mask_check(const vsh_mesh *mesh, size_t index, vsh_error *
     }
     if (!good) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: its alpha mask of %d × %d texels has a size, a wrap, a transform or a cutoff "
-                         "that is none",
+                         "%s: its alpha mask of %d × %d texels has a bad size, wrap, transform or cutoff",
                          vshi_mesh_label(mesh, index).text, mask->width, mask->height);
     }
     if (mesh->mask_uvs == NULL && mesh->vertex_count > 0) {
@@ -43,13 +42,13 @@ vshi_mask_place vshi_alpha_mask_place(const vsh_alpha_mask *mask, const float uv
 
 /* --- one place */
 
-/* The texel that a column (row) is, of an image that goes on; any whole number. */
-static int32_t wrapped(double at, int32_t size, int32_t wrap) {
+/* The texel at a column (row), any whole number, of an image that continues by its wrap. */
+static int32_t wrap_index(double at, int32_t size, int32_t wrap) {
     if (wrap == VSH_WRAP_CLAMP) {
         return at <= 0.0 ? 0 : at >= size - 1.0 ? size - 1 : (int32_t)at;
     }
     const double period = wrap == VSH_WRAP_MIRROR ? 2.0 * size : size;
-    const double rest = at - period * floor(at / period); /* rounding may leave a period of none */
+    const double rest = at - period * floor(at / period); /* rounding may leave it outside of the period */
     const int32_t in = rest <= 0.0 ? 0 : rest >= period ? 0 : (int32_t)rest;
     return in < size ? in : 2 * size - 1 - in;
 }
@@ -61,11 +60,11 @@ static void find_pair(double at, int32_t size, int32_t wrap, size_t pair[2]) {
         pair[1] = pair[0] + 1;
         return;
     }
-    pair[0] = (size_t)wrapped(at, size, wrap);
-    pair[1] = (size_t)wrapped(at + 1.0, size, wrap);
+    pair[0] = (size_t)wrap_index(at, size, wrap);
+    pair[1] = (size_t)wrap_index(at + 1.0, size, wrap);
 }
 
-/* Of 255, as the base's factor makes it. */
+/* Applies the base's factor to an alpha of 255. */
 static bool is_opaque(const vsh_alpha_mask *mask, double alpha) {
     return mask->base_alpha * alpha >= 255.0 * mask->alpha_cutoff;
 }
@@ -87,7 +86,7 @@ bool vshi_alpha_mask_opaque(const vsh_alpha_mask *mask, vshi_mask_place at) {
 
 /* --- rectangles */
 
-double vshi_mask_table_bytes(const vsh_alpha_mask *mask) {
+static double find_table_bytes(const vsh_alpha_mask *mask) {
     return sizeof(uint32_t) * (mask->width + 1.0) * (mask->height + 1.0);
 }
 
@@ -95,7 +94,7 @@ vsh_result vshi_mask_table_create(const vsh_alpha_mask *mask, const vsh_run *run
                                   vsh_error *error) {
     const size_t width = (size_t)mask->width, height = (size_t)mask->height, stride = width + 1;
     *table = (vshi_mask_table){.mask = mask};
-    VSHI_TRY(vshi_check_limit(run, vshi_mask_table_bytes(mask), "alpha masks", error));
+    VSHI_TRY(vshi_check_limit(run, find_table_bytes(mask), "alpha masks", error));
     VSHI_TRY(
         vshi_allocate((void **)&table->sums, stride * (height + 1), sizeof(uint32_t), "alpha masks", error));
     for (size_t y = 0; y < height; ++y) {
@@ -115,38 +114,36 @@ void vshi_mask_table_free(vshi_mask_table *table) {
     table->sums = NULL;
 }
 
-/* Texels along one side of the image, from first to last: where it goes on, in no more than two parts. */
+/* Texels along one side of the image, in one or two parts because of its wrap. */
 typedef struct span {
     int32_t first[2], last[2];
     int parts;
 } span;
 
-/* Of the columns (rows) low … high, whole numbers. */
-static span span_of(double low, double high, int32_t size, int32_t wrap) {
+/* Finds the span of the columns (rows) low … high, whole numbers. */
+static span find_span(double low, double high, int32_t size, int32_t wrap) {
     if (wrap != VSH_WRAP_CLAMP && !(high - low < size - 1.0)) {
         return (span){{0}, {size - 1}, 1};
     }
-    const int32_t a = wrapped(low, size, wrap), b = wrapped(high, size, wrap);
+    const int32_t a = wrap_index(low, size, wrap), b = wrap_index(high, size, wrap);
     if (wrap == VSH_WRAP_CLAMP) {
         return (span){{a}, {b}, 1};
     }
     if (wrap == VSH_WRAP_REPEAT) {
         return a <= b ? (span){{a}, {b}, 1} : (span){{a, 0}, {size - 1, b}, 2};
     }
-    const double turn =
-        floor(high / size) * size; /* the columns before it go one way, those from it the other */
+    const double turn = floor(high / size) * size; /* here the mirrored columns change direction */
     if (!(turn > low)) {
         return (span){{a < b ? a : b}, {a < b ? b : a}, 1};
     }
-    const bool end =
-        wrapped(turn, size, wrap) != 0; /* it is turned about the last texel, or about the first */
+    const bool end = wrap_index(turn, size, wrap) != 0; /* at the last texel, not at the first */
     return end ? (span){{a, b}, {size - 1, size - 1}, 2} : (span){{0, 0}, {a, b}, 2};
 }
 
 static vshi_mask_cover cover_of_texels(const vshi_mask_table *table, double low[2], double high[2]) {
     const vsh_alpha_mask *mask = table->mask;
-    const span columns = span_of(low[0], high[0], mask->width, mask->wrap[0]);
-    const span rows = span_of(low[1], high[1], mask->height, mask->wrap[1]);
+    const span columns = find_span(low[0], high[0], mask->width, mask->wrap[0]);
+    const span rows = find_span(low[1], high[1], mask->height, mask->wrap[1]);
     const size_t stride = (size_t)mask->width + 1;
     bool any = false, all = true;
     for (int i = 0; i < columns.parts; ++i) {
@@ -163,8 +160,7 @@ static vshi_mask_cover cover_of_texels(const vshi_mask_table *table, double low[
     return all ? VSHI_MASK_OPAQUE : any ? VSHI_MASK_MIXED : VSHI_MASK_CLEAR;
 }
 
-/* Between texels alpha is bilinear, so that of a part of such a cell the least and the most are at its
- * corners. */
+/* Between texels alpha is bilinear, so its extremes in a part of a cell are at the part's corners. */
 enum { MOST_CELLS = 6 }; /* along a side */
 
 static vshi_mask_cover cover_of_cells(const vsh_alpha_mask *mask, const double low[2], const double high[2]) {
@@ -190,7 +186,7 @@ static vshi_mask_cover cover_of_cells(const vsh_alpha_mask *mask, const double l
 }
 
 vshi_mask_cover vshi_mask_table_cover(const vshi_mask_table *table, const vshi_mask_place corners[3]) {
-    static const double FARTHEST = 0x1p50; /* from where on columns are no whole numbers any more */
+    static const double FARTHEST = 0x1p50; /* beyond, doubles do not resolve columns */
     double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
     for (int k = 0; k < 3; ++k) {
         const double at[2] = {corners[k].x, corners[k].y};
@@ -212,9 +208,9 @@ vshi_mask_cover vshi_mask_table_cover(const vshi_mask_table *table, const vshi_m
     return cover_of_texels(table, low, high);
 }
 
-/* --- pieces: triangles that are what a mask leaves of a mesh */
+/* --- pieces: the opaque parts of a masked mesh */
 
-/* A piece that is cut this often is kept as it is: by then its sides are 2^-40 of the triangle's. */
+/* Most cuts of a piece: its sides are then 2^-40 of the triangle's. */
 enum { DEEPEST = 120 };
 
 typedef struct corner {
@@ -232,9 +228,9 @@ typedef struct cutting {
     vshi_mask_table table;
     double size;
     double most; /* pieces */
-    uint64_t count, looked;
+    uint64_t count, tested;
     vshi_job *job;
-    float *positions; /* NULL: pieces are only counted */
+    float *positions; /* NULL: only count */
 } cutting;
 
 static corner middle(const corner *a, const corner *b) {
@@ -262,7 +258,7 @@ static void keep(cutting *c, const piece *p) {
     ++c->count;
 }
 
-/* False where there are too many, or the job is cancelled. */
+/* Returns false for too many pieces, or if the job is cancelled. */
 static bool cut_triangle(cutting *c, size_t triangle) {
     enum { OFTEN = 1 << 16 };
     piece stack[DEEPEST + 1];
@@ -275,7 +271,7 @@ static bool cut_triangle(cutting *c, size_t triangle) {
     }
     while (left > 0) {
         const piece p = stack[--left];
-        if (++c->looked % OFTEN == 0 && ((double)c->count > c->most || vshi_job_advance(c->job, 0))) {
+        if (++c->tested % OFTEN == 0 && ((double)c->count > c->most || vshi_job_advance(c->job, 0))) {
             return false;
         }
         const vshi_mask_place places[3] = {p.corners[0].place, p.corners[1].place, p.corners[2].place};
@@ -311,7 +307,7 @@ static vsh_result cut_all(cutting *c, vsh_error *error) {
         return vshi_job_cancelled(c->job)
                    ? vshi_job_fail_cancelled(c->job, error)
                    : vshi_fail(error, VSH_ERROR_LIMIT,
-                               "%s: what its alpha mask leaves is more than %.0f pieces of %.3g",
+                               "%s: its alpha mask leaves more than %.0f pieces of %.3g",
                                vshi_mesh_label(c->mesh, VSHI_MESH_ALONE).text, c->most, c->size);
     }
     return VSH_OK;
@@ -332,7 +328,7 @@ vsh_result vshi_mask_pieces_cut(const vsh_mesh *mesh, double size, const vsh_run
     }
     VSHI_TRY_DONE(cut_all(&c, error));
     const size_t count = (size_t)c.count;
-    VSHI_TRY_DONE(vshi_check_limit(run, vshi_mask_table_bytes(mesh->mask) + PIECE_BYTES * (double)count,
+    VSHI_TRY_DONE(vshi_check_limit(run, find_table_bytes(mesh->mask) + PIECE_BYTES * (double)count,
                                    "pieces of alpha masks", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&pieces->positions, 9 * count, sizeof *pieces->positions,
                                 "pieces of alpha masks", error));

@@ -1,4 +1,4 @@
-/* Meshes that a texture cuts out: where they are opaque, and triangles that are no more than that. */
+/* Meshes cut out by a texture: their opaque places, and triangles of their opaque parts. */
 #ifndef VSHI_ALPHA_MASK_H
 #define VSHI_ALPHA_MASK_H
 
@@ -13,12 +13,11 @@
 extern "C" {
 #endif
 
-/* Errors: VSH_ERROR_ARGUMENT where a mesh's mask is none (its size, its UVs), named as in vshi_mesh_label().
- */
+/* Checks a mesh's mask. Errors: VSH_ERROR_ARGUMENT (its size, its UVs, …). */
 vsh_result vshi_alpha_mask_check(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
-/* Where the image is looked up for texture coordinates: columns and rows from the middle of the upper left
- * texel. Not finite where they are not. */
+/* A place in the image: columns and rows from the middle of the upper left texel. Not finite if the texture
+ * coordinates are not. */
 typedef struct vshi_mask_place {
     double x, y;
 } vshi_mask_place;
@@ -34,15 +33,13 @@ typedef struct vshi_mask_table {
     uint32_t *sums; /* [height + 1][width + 1] */
 } vshi_mask_table;
 
-double vshi_mask_table_bytes(const vsh_alpha_mask *mask);
-
 /* Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. Free with vshi_mask_table_free(). */
 vsh_result vshi_mask_table_create(const vsh_alpha_mask *mask, const vsh_run *run, vshi_mask_table *table,
                                   vsh_error *error);
 void vshi_mask_table_free(vshi_mask_table *table);
 
-/* Covers of a mask over the rectangle around a triangle of such corners. They are exact for a rectangle of
- * few texels. For others MIXED also means that the table cannot tell. */
+/* Cover of a mask over the rectangle around a triangle's corners. It is exact for a rectangle of few texels.
+ * For larger ones MIXED may also mean unknown. */
 typedef enum vshi_mask_cover {
     VSHI_MASK_CLEAR,  /* nowhere opaque */
     VSHI_MASK_OPAQUE, /* everywhere */
@@ -50,9 +47,9 @@ typedef enum vshi_mask_cover {
 } vshi_mask_cover;
 vshi_mask_cover vshi_mask_table_cover(const vshi_mask_table *table, const vshi_mask_place corners[3]);
 
-/* The opaque parts of a masked mesh. Each triangle is cut until its pieces are opaque, or clear and left out,
- * or no longer than `size` (world units) and not all clear. Corners are in the mesh's own space. Neighbours
- * may meet in the middle of an edge. */
+/* The opaque parts of a masked mesh. Each triangle is cut until a piece is opaque, or clear and dropped, or
+ * at most `size` (world units) long. Corners are in the mesh's own space. Neighbours may meet in the middle
+ * of an edge. */
 typedef struct vshi_mask_pieces {
     float *positions;  /* [3 × count][3] */
     uint32_t *indices; /* [count][3] */
@@ -60,7 +57,7 @@ typedef struct vshi_mask_pieces {
 } vshi_mask_pieces;
 
 /* Errors: VSH_ERROR_LIMIT (run->memory_limit, more than 2^31 - 1 pieces), VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. Free with vshi_mask_pieces_free(), after an error too. */
+ * VSH_ERROR_CANCELLED. Free with vshi_mask_pieces_free(), even after an error. */
 VSHI_SHARED vsh_result vshi_mask_pieces_cut(const vsh_mesh *mesh, double size, const vsh_run *run,
                                             vshi_mask_pieces *pieces, vsh_error *error);
 VSHI_SHARED void vshi_mask_pieces_free(vshi_mask_pieces *pieces);

@@ -1,19 +1,106 @@
-/* Two sides at an edge are partners. Where there are more, the triangles are sorted by their angle around the
- * edge: one whose back looks onwards begins a wedge of solid, the next whose back looks back ends it. So
- * boxes that share an edge or a face in one mesh stay boxes. */
+/* Connections of triangles by their vertices and edges. */
 #include "mesh/edges.h"
 
+#include "base/bytes.h"
 #include "base/elementary.h"
 #include "base/memory.h"
-#include "mesh/weld.h"
 
-#include <float.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { MOST_LAYERS = 16 }; /* of copies; triangles beyond them hang together with none */
+vsh_result vshi_weld(size_t count, vshi_key_fn *key_of, const void *user, uint32_t *weld, vsh_error *error) {
+    size_t capacity = 16;
+    while (capacity < 2 * count) {
+        capacity *= 2;
+    }
+    uint32_t *slots = NULL; /* vertex + 1, or 0 where empty */
+    VSHI_TRY(vshi_allocate((void **)&slots, capacity, sizeof *slots, "welding vertices", error));
+    for (size_t v = 0; v < count; ++v) {
+        uint64_t key[VSHI_KEY_WORDS], other[VSHI_KEY_WORDS], hash = 1;
+        key_of(user, v, key);
+        for (int k = 0; k < VSHI_KEY_WORDS; ++k) {
+            hash = vshi_mix(hash ^ key[k]);
+        }
+        size_t slot = (size_t)hash & (capacity - 1);
+        for (; slots[slot] != 0; slot = (slot + 1) & (capacity - 1)) {
+            key_of(user, slots[slot] - 1, other);
+            if (memcmp(key, other, sizeof key) == 0) {
+                break;
+            }
+        }
+        if (slots[slot] == 0) {
+            slots[slot] = (uint32_t)v + 1;
+        }
+        weld[v] = slots[slot] - 1;
+    }
+    free(slots);
+    return VSH_OK;
+}
 
-/* A side at the edge that is looked at. */
+void vshi_list_groups(const uint32_t *group, size_t count, uint32_t groups, uint32_t *begin, uint32_t *list) {
+    for (size_t i = 0; i < count; ++i) {
+        if (group[i] != UINT32_MAX) {
+            ++begin[group[i] + (size_t)2];
+        }
+    }
+    for (size_t g = 0; g < groups; ++g) {
+        begin[g + 2] += begin[g + 1];
+    }
+    for (size_t i = 0; i < count; ++i) {
+        if (group[i] != UINT32_MAX) {
+            list[begin[group[i] + (size_t)1]++] = (uint32_t)i;
+        }
+    }
+}
+
+/* Sorts the sides `from` (NULL: all) stably by one of their ends. Near vertices of a mesh mostly have near
+ * numbers, so memory is accessed in order, unlike a hash table's. */
+static void sort_by_end(const vshi_sorted_sides *sides, int end, const uint32_t *from, uint32_t *first,
+                        uint32_t *sorted) {
+    const uint32_t count = (uint32_t)(3 * sides->triangle_count);
+    uint32_t ends[2];
+    memset(first, 0, (sides->vertex_count + 1) * sizeof *first);
+    for (uint32_t side = 0; side < count; ++side) {
+        vshi_side_ends(sides->corners, side, ends);
+        ++first[ends[end] + (size_t)1];
+    }
+    for (size_t v = 0; v < sides->vertex_count; ++v) {
+        first[v + 1] += first[v];
+    }
+    for (uint32_t i = 0; i < count; ++i) {
+        const uint32_t side = from != NULL ? from[i] : i;
+        vshi_side_ends(sides->corners, side, ends);
+        sorted[first[ends[end]]++] = side;
+    }
+}
+
+vsh_result vshi_sort_sides(vshi_sorted_sides *sides, vsh_error *error) {
+    const char *what = "edges of triangles";
+    const size_t count = 3 * sides->triangle_count;
+    uint32_t *first = NULL, *by_higher = NULL;
+    if (sides->triangle_count > UINT32_MAX / 3) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu triangles, at most %u", what, sides->triangle_count,
+                         UINT32_MAX / 3);
+    }
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&first, sides->vertex_count + 1, sizeof *first, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&by_higher, count, sizeof *by_higher, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&sides->sorted, count, sizeof *sides->sorted, what, error));
+    sort_by_end(sides, 1, NULL, first, by_higher);
+    sort_by_end(sides, 0, by_higher, first, sides->sorted);
+done:
+    free(by_higher);
+    free(first);
+    return result;
+}
+
+/* --- partners. Two sides at an edge are partners. More are sorted by their triangles' angles around the
+ * edge: a triangle whose back faces the next one begins a wedge of solid, which that one ends. So boxes that
+ * share an edge or a face in one mesh stay boxes. */
+
+enum { MOST_LAYERS = 16 }; /* of copies; further triangles have no partners */
+
+/* A side at the current edge. */
 typedef struct use {
     uint32_t side;
     uint32_t third;     /* vertex of the triangle, beside the edge's */
@@ -25,23 +112,23 @@ typedef struct spoke {
     double angle;
     uint32_t side;
     uint32_t downwards;
-    bool frayed; /* its triangle hangs together with one at an edge that has no other */
-    bool taken;
+    bool frayed; /* its triangle is connected to one with an open edge */
+    bool joined;
 } spoke;
 
 typedef struct finding {
     const vsh_mesh *mesh;
     bool mirrored;
     vshi_edges *edges;
-    uint8_t *flat;  /* [triangle_count]: of no area */
+    uint8_t *flat;  /* [triangle_count]: no area */
     uint8_t *layer; /* [triangle_count] */
     int layers;
     uint32_t *corners; /* [triangle_count][3]: welded, in the world's order */
     vshi_sorted_sides sides;
     use *uses;       /* [most sides of an edge] */
     spoke *spokes;   /* the same */
-    size_t odd;      /* edges of three triangles, five, … */
-    uint8_t *frayed; /* [triangle_count]; none before find_frayed() */
+    size_t odd;      /* edges of three, five, … triangles */
+    uint8_t *frayed; /* [triangle_count]; set by find_frayed() */
     uint32_t *queue; /* [triangle_count] */
 } finding;
 
@@ -66,15 +153,15 @@ static int compare_spokes(const void *a, const void *b) {
     if (x->angle != y->angle) {
         return x->angle < y->angle ? -1 : 1;
     }
-    if (x->downwards != y->downwards) { /* faces that coincide: one wedge ends before the next begins */
+    if (x->downwards != y->downwards) { /* coinciding faces: one wedge ends before the next begins */
         return x->downwards < y->downwards ? -1 : 1;
     }
     return (x->side > y->side) - (x->side < y->side);
 }
 
-/* Chooses the spoke of three that ends at the edge, while the two others go on in each other. It is a card
- * that is stuck to a solid, if one of them hangs together with edges of one triangle. Else the two go on that
- * come nearest to a plane, preferably one that begins a wedge and one that ends it. */
+/* Chooses the spoke of three that ends at the edge, while the two others continue each other. A frayed spoke
+ * is a card stuck to a solid, and ends. Else the two that come nearest to a plane continue, preferably one
+ * that begins a wedge and one that ends it. */
 static size_t ending_of_three(const spoke *s) {
     static const double PI = 3.14159265358979323846;
     size_t best = 0;
@@ -94,19 +181,19 @@ static size_t ending_of_three(const spoke *s) {
 static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
     qsort(s, count, sizeof *s, compare_spokes);
     if (count == 3) {
-        s[ending_of_three(s)].taken = true;
+        s[ending_of_three(s)].joined = true;
     }
     for (size_t i = 0; i < count; ++i) {
         const size_t next = (i + 1) % count;
-        if (s[i].downwards && !s[next].downwards && !s[i].taken && !s[next].taken) {
+        if (s[i].downwards && !s[next].downwards && !s[i].joined && !s[next].joined) {
             join(edges, s[i].side, s[next].side);
-            s[i].taken = s[next].taken = true;
+            s[i].joined = s[next].joined = true;
         }
     }
-    /* faces that disagree: neighbours */
+    /* faces that disagree: join neighbours */
     size_t waiting = count;
     for (size_t i = 0; i < count; ++i) {
-        if (s[i].taken) {
+        if (s[i].joined) {
             continue;
         }
         if (waiting == count) {
@@ -135,7 +222,7 @@ static void join_many(finding *f, size_t count) {
     join_spokes(f->edges, f->spokes, count);
 }
 
-/* Lists the sides of an edge that count: of triangles of a layer that are not skipped, nor given before. */
+/* Lists the sides of an edge, in a layer, except for triangles that are skipped or duplicates. */
 static size_t list_uses(finding *f, size_t begin, size_t end, int layer) {
     vshi_edges *edges = f->edges;
     size_t count = 0, kept = 0;
@@ -184,8 +271,8 @@ static bool next_uses(finding *f, cursor *at, size_t *count) {
     return true;
 }
 
-/* Joins the sides of each edge that has two, four, … (`parity` 0) or three, five, … (1), and counts the
- * others of more than two. */
+/* Joins the sides of each edge with two, four, … (`parity` 0) or three, five, … (1) sides, and counts other
+ * edges of more than two. */
 static void join_sides(finding *f, size_t parity) {
     size_t count;
     f->odd = 0;
@@ -200,7 +287,7 @@ static void join_sides(finding *f, size_t parity) {
     }
 }
 
-/* Marks the triangles that hang together with one at an edge of its own. */
+/* Marks the triangles that are connected to one with an open edge. */
 static void find_frayed(finding *f) {
     const vshi_edges *edges = f->edges;
     size_t waiting = 0, count;
@@ -221,7 +308,7 @@ static void find_frayed(finding *f) {
     }
 }
 
-/* Fills partner, skipped, first, doubled and open. Flat triangles may be what joins two long edges to one. */
+/* Fills partner, skipped, first, doubled and open. Flat triangles may join two long edges to one. */
 static void join_edges(finding *f, bool with_flat) {
     const size_t count = f->mesh->triangle_count;
     vshi_edges *edges = f->edges;
@@ -234,7 +321,7 @@ static void join_edges(finding *f, bool with_flat) {
         edges->skipped[i] = v[0] == v[1] || v[1] == v[2] || v[2] == v[0] || (!with_flat && f->flat[i]);
     }
     join_sides(f, 0);
-    if (f->odd > 0) { /* which wait until it is known what is frayed */
+    if (f->odd > 0) { /* these need to know the frayed triangles */
         find_frayed(f);
         join_sides(f, 1);
     }
@@ -244,7 +331,7 @@ static void join_edges(finding *f, bool with_flat) {
     }
 }
 
-/* A triangle's corners, whichever way it looks. */
+/* A vshi_key_fn: a triangle's corners in any order. */
 static void key_of_corners(const void *user, size_t triangle, uint64_t key[VSHI_KEY_WORDS]) {
     const uint32_t *v = (const uint32_t *)user + 3 * triangle;
     const uint32_t low = v[0] < v[1] ? v[0] : v[1], high = v[0] < v[1] ? v[1] : v[0];
@@ -253,7 +340,7 @@ static void key_of_corners(const void *user, size_t triangle, uint64_t key[VSHI_
     key[2] = v[2] > high ? v[2] : high;
 }
 
-/* A triangle's layer is how many before it have the same corners. */
+/* A triangle's layer is the number of triangles before it with the same corners. */
 static vsh_result find_layers(finding *f, vsh_error *error) {
     const size_t count = f->mesh->triangle_count;
     uint32_t *original = NULL, *copies = NULL;
@@ -273,11 +360,30 @@ done:
     return result;
 }
 
+static void key_of_place(const void *user, size_t vertex, uint64_t key[VSHI_KEY_WORDS]) {
+    const float *p = (const float *)user + 3 * vertex;
+    const float place[2 * VSHI_KEY_WORDS] = {p[0] + 0.0f, p[1] + 0.0f, p[2] + 0.0f}; /* -0 is 0 */
+    memcpy(key, place, sizeof place);
+}
+
+/* The welded vertices of triangle i in the world's order. */
+static void find_corners(const vsh_mesh *mesh, const uint32_t *weld, bool mirrored, size_t i, uint32_t v[3]) {
+    const uint32_t *given = mesh->indices + 3 * i;
+    v[0] = weld[given[0]];
+    v[1] = weld[given[mirrored ? 2 : 1]];
+    v[2] = weld[given[mirrored ? 1 : 2]];
+}
+
+/* Sets weld[v] to the lowest vertex at the position of v. */
+static vsh_result weld_positions(const vsh_mesh *mesh, uint32_t *weld, vsh_error *error) {
+    return vshi_weld(mesh->vertex_count, key_of_place, mesh->positions, weld, error);
+}
+
 static vsh_result sort_sides(finding *f, vsh_error *error) {
     const vsh_mesh *mesh = f->mesh;
     size_t most = 0;
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        vshi_edges_corners(mesh, f->edges->weld, f->mirrored, i, f->corners + 3 * i);
+        find_corners(mesh, f->edges->weld, f->mirrored, i, f->corners + 3 * i);
     }
     f->sides = (vshi_sorted_sides){f->corners, mesh->triangle_count, mesh->vertex_count, NULL};
     VSHI_TRY(vshi_sort_sides(&f->sides, error));
@@ -321,7 +427,7 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart
     size_t flats = 0;
     vsh_result result;
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
-    VSHI_TRY_DONE(vshi_mesh_weld(mesh, edges->weld, error));
+    VSHI_TRY_DONE(weld_positions(mesh, edges->weld, error));
     VSHI_TRY_DONE(sort_sides(&f, error));
     if (copies_apart) {
         VSHI_TRY_DONE(find_layers(&f, error));
@@ -332,7 +438,7 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart
     }
     join_edges(&f, false);
     const size_t open = edges->open;
-    if (flats > 0 && open > 0) { /* closed with them or without them is closed */
+    if (flats > 0 && open > 0) { /* a mesh that is closed with or without them is closed */
         join_edges(&f, true);
         if (edges->open >= open) {
             join_edges(&f, false);
@@ -367,7 +473,7 @@ typedef struct walking {
     const vsh_mesh *mesh;
     vshi_edges edges;
     bool mirrored;
-    uint32_t *of;    /* [triangle_count]: its component; NO_COMPONENT for those without area */
+    uint32_t *of;    /* [triangle_count]: its component; NO_COMPONENT without area */
     uint32_t *queue; /* [triangle_count] */
     vshi_components *found;
 } walking;
@@ -375,11 +481,11 @@ typedef struct walking {
 /* Whether a triangle's side runs from its edge's lower vertex to the upper one. */
 static bool upwards(const walking *w, uint32_t side) {
     uint32_t v[3];
-    vshi_edges_corners(w->mesh, w->edges.weld, w->mirrored, side / 3, v);
+    find_corners(w->mesh, w->edges.weld, w->mirrored, side / 3, v);
     return v[side % 3] < v[(side % 3 + 1) % 3];
 }
 
-/* Numbers and turns all that hangs together with triangle `seed`. */
+/* Numbers and turns all triangles connected to `seed`. */
 static void walk(walking *w, uint32_t seed) {
     vshi_components *c = w->found;
     const uint32_t number = (uint32_t)c->count++;
@@ -439,7 +545,7 @@ static vsh_result list_rims(walking *w, vsh_error *error) {
         for (uint32_t k = 0; k < 3 && !w->edges.skipped[i]; ++k) {
             if (w->edges.partner[3 * i + k] == VSHI_NO_PARTNER) {
                 uint32_t v[3];
-                vshi_edges_corners(w->mesh, w->edges.weld, w->mirrored, i, v);
+                find_corners(w->mesh, w->edges.weld, w->mirrored, i, v);
                 const uint32_t a = v[k], b = v[(k + 1) % 3];
                 c->rims[c->rim_count++] = (vshi_rim){w->of[i], c->turned[i] ? b : a, c->turned[i] ? a : b};
             }
@@ -476,7 +582,7 @@ static vsh_result list_terrain_rims(const vsh_mesh *mesh, vshi_terrain t, vshi_c
     return VSH_OK;
 }
 
-/* The one component of a terrain: the order of its triangles says how they hang together. */
+/* Makes the one component of a terrain, whose triangles' order defines their connections. */
 static vsh_result list_terrain(const vsh_mesh *mesh, vshi_terrain t, vshi_components *c, vsh_error *error) {
     const size_t count = mesh->triangle_count;
     const vshi_array arrays[] = {VSHI_ARRAY(c->turned, count), VSHI_ARRAY(c->doubled, count),
@@ -532,40 +638,8 @@ void vshi_components_free(vshi_components *components) {
     *components = (vshi_components){0};
 }
 
-/* --- checks of a mesh's triangles and edges. An edge that an odd number of triangles meets at is a border;
- * one whose triangles run along it more often one way than the other joins triangles that disagree about the
- * outside. */
-
-static void grow(vsh_mesh_report *report, vshi_vec p) {
-    const double at[3] = {p.x, p.y, p.z};
-    for (int k = 0; k < 3; ++k) {
-        report->bounds_min[k] = at[k] < report->bounds_min[k] ? at[k] : report->bounds_min[k];
-        report->bounds_max[k] = at[k] > report->bounds_max[k] ? at[k] : report->bounds_max[k];
-    }
-}
-
-vsh_result vshi_mesh_look_over(const vsh_mesh *mesh, size_t index, vsh_mesh_report *report,
-                               vsh_error *error) {
-    VSHI_TRY(vshi_mesh_validate(mesh, index, error));
-    *report = (vsh_mesh_report){.bounds_min = {DBL_MAX, DBL_MAX, DBL_MAX},
-                                .bounds_max = {-DBL_MAX, -DBL_MAX, -DBL_MAX}};
-    for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        if (vshi_mesh_degenerate(mesh, i)) {
-            ++report->degenerate_triangles;
-            continue;
-        }
-        vshi_vec corner[3];
-        vshi_mesh_triangle(mesh, i, corner);
-        report->area +=
-            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
-        for (int k = 0; k < 3; ++k) {
-            grow(report, corner[k]);
-        }
-    }
-    return VSH_OK;
-}
-
-/* --- edges */
+/* --- checks of a mesh's edges. An edge of an odd number of triangles is a border. An edge whose triangles
+ * run along it more often one way than the other joins triangles that disagree about the outside. */
 
 typedef struct edge_count {
     size_t open;
@@ -580,7 +654,8 @@ static void count_edge(edge_count *count, size_t upwards, size_t downwards) {
     }
 }
 
-/* Shapes of triangles: corners on a line make it flat. Two corners in one place make its edges cancel out. */
+/* Shapes of triangles: FLAT has corners on a line. The edges of COLLAPSED, with two corners at one place,
+ * cancel. */
 enum { SOLID, FLAT, COLLAPSED };
 
 /* Counts edges, without and with the flat triangles. */
@@ -609,7 +684,7 @@ vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, 
                                  VSHI_ARRAY(shape, count)};
     vsh_result result;
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
-    VSHI_TRY_DONE(vshi_mesh_weld(mesh, weld, error));
+    VSHI_TRY_DONE(weld_positions(mesh, weld, error));
     for (size_t i = 0; i < count; ++i) {
         uint32_t *v = corners + 3 * i;
         for (size_t k = 0; k < 3; ++k) {
@@ -622,8 +697,8 @@ vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, 
     sides.corners = corners;
     VSHI_TRY_DONE(vshi_sort_sides(&sides, error));
     count_edges(&sides, shape, &solid, &all);
-    /* A flat triangle casts nothing, but it may be what joins two long edges to one: a mesh that is closed
-     * with such triangles or without them is closed. */
+    /* A flat triangle casts nothing, but may join two long edges to one. A mesh that is closed with or
+     * without such triangles is closed. */
     const bool with_flat = all.open < solid.open;
     report->open_edges = with_flat ? all.open : solid.open;
     report->flipped_edges = with_flat ? all.flipped : solid.flipped;

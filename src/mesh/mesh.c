@@ -1,6 +1,6 @@
 #include "mesh/mesh.h"
 
-#include "base/similarity.h"
+#include "base/vec.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -130,32 +130,29 @@ bool vshi_terrain_is_even(const vsh_mesh *mesh, vshi_terrain t) {
     static const double ROUNDING = 1e-6;
     const float *first = mesh->positions, *last = first + 3 * (t.columns * t.rows - 1);
     const double width = (double)last[0] - (double)first[0], depth = (double)last[2] - (double)first[2];
-    bool even = true;
-    for (size_t row = 0; even && row < t.rows; ++row) {
-        const double z = (double)first[2] + depth * ((double)row / (double)(t.rows - 1));
-        for (size_t column = 0; column < t.columns; ++column) {
-            const float *p = first + 3 * (row * t.columns + column);
-            const double x = (double)first[0] + width * ((double)column / (double)(t.columns - 1));
-            even = even && fabs((double)p[0] - x) <= ROUNDING * width &&
-                   fabs((double)p[2] - z) <= ROUNDING * depth;
+    for (size_t i = 0; i < t.columns * t.rows; ++i) {
+        const float *p = first + 3 * i;
+        const double x = (double)first[0] + width * ((double)(i % t.columns) / (double)(t.columns - 1));
+        const double z = (double)first[2] + depth * ((double)(i / t.columns) / (double)(t.rows - 1));
+        if (!(fabs((double)p[0] - x) <= ROUNDING * width && fabs((double)p[2] - z) <= ROUNDING * depth)) {
+            return false;
         }
     }
-    return even;
+    return true;
 }
 
-static bool lie_apart(const float *positions, vshi_terrain t) {
-    bool apart = true;
-    for (size_t row = 0; apart && row < t.rows; ++row) {
-        for (size_t column = 0; column < t.columns; ++column) {
-            const float *p = positions + 3 * (row * t.columns + column);
-            apart = apart && (column == 0 || p[0] > p[-3]) &&
-                    (row == 0 || p[2] > p[2 - 3 * (ptrdiff_t)t.columns]);
+static bool grows_along_axes(const float *positions, vshi_terrain t) {
+    for (size_t i = 0; i < t.columns * t.rows; ++i) {
+        const float *p = positions + 3 * i;
+        if ((i % t.columns > 0 && !(p[0] > p[-3])) ||
+            (i >= t.columns && !(p[2] > p[2 - 3 * (ptrdiff_t)t.columns]))) {
+            return false;
         }
     }
-    return apart;
+    return true;
 }
 
-/* The terrain that so many vertices and triangles would be; no rows where they are none. */
+/* The terrain with a mesh's counts of vertices and triangles; 0 rows if there is none. */
 static vshi_terrain guess_terrain(const vsh_mesh *mesh) {
     if (mesh->triangle_count < 2 || mesh->indices[1] < 3) { /* the first triangle is 0, columns + 1, 1 */
         return (vshi_terrain){0};
@@ -185,20 +182,20 @@ bool vshi_mesh_is_terrain(const vsh_mesh *mesh, vshi_terrain *terrain) {
             return false;
         }
     }
-    return lie_apart(mesh->positions, *terrain);
+    return grows_along_axes(mesh->positions, *terrain);
 }
 
 /* --- samples of coarse smooth meshes are lifted towards the surface that their normals describe, after
  * Hanika, "Hacking the Shadow Terminator" (Ray Tracing Gems II, 2021): p' = p + Σ b_i (-min(0, (p -
  * v_i)·n_i)) n_i. Only convex parts are lifted, by about the sagitta of the arc over the triangle. */
 
-/* Vertex normals nearer to the geometric normal than this are those of a flat triangle (0.08°): exporters
- * write them with a float's noise, and a flat mesh is to stay exactly flat. */
+/* A triangle is flat if its vertex normals are nearer to the geometric normal than this (0.08°): exporters
+ * write normals with a float's noise, and a flat mesh must stay exactly flat. */
 static const double FLAT_COSINE = 1.0 - 1e-6;
 
-/* Normals that lean farther over their face than this (53°) come from a shared hard edge, not from a curved
- * surface. They still shade, but do not lift: over a cube with averaged normals (54.7°) the lift would be two
- * thirds of its half edge, and tear it off the floor. */
+/* Normals that lean farther than this (53°) come from a shared hard edge, not from a curved surface. They
+ * shade, but do not lift. On a cube with averaged normals (54.7°) the lift would be two thirds of its half
+ * edge, and tear it off the floor. */
 static const double LIFT_COSINE = 0.6;
 
 /* The least cosine between the shading and the geometric normal. */
@@ -208,8 +205,7 @@ bool vshi_surface_set(const vsh_mesh *mesh, size_t triangle, vshi_surface *surfa
     uint32_t vertex[3];
     vshi_mesh_triangle_of(mesh, triangle, surface->corner, vertex);
     const vshi_vec *corner = surface->corner;
-    surface->geometric =
-        vshi_unit(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+    surface->geometric = vshi_unit(vshi_triangle_normal(corner));
     surface->mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
     surface->smooth = false;
     for (int k = 0; k < 3; ++k) {
@@ -280,18 +276,18 @@ vshi_vec vshi_surface_tangent(const vsh_mesh *mesh, size_t triangle, double *han
         vshi_scale(vshi_sub(vshi_scale(a, v[2] - v[0]), vshi_scale(b, v[1] - v[0])), *handedness));
 }
 
-/* --- meshes chosen by their names, as a shell matches those of files. Not fnmatch(3): that depends on the
- * locale, and takes exponential time for some patterns. */
+/* --- patterns of meshes' names, as a shell matches files. fnmatch(3) depends on the locale, and needs
+ * exponential time for some patterns. */
 
-/* Behind the UTF-8 character at `text`. */
+/* The end of the UTF-8 character at `text`. */
 static const char *next_character(const char *text) {
     for (++text; ((unsigned char)*text & 0xc0) == 0x80; ++text) {
     }
     return text;
 }
 
-/* Behind the "]" of the set that `pattern` is in, with whether the byte is one of it; NULL: no set, as
- * nothing closes it. "[!…]" is one of all others, "[a-z]" one of a range. */
+/* Matches a byte with the set behind a "[": "[!…]" matches all other bytes, "[a-z]" a range. Returns the end
+ * of the set; NULL if no "]" closes it. */
 static const char *match_set(const char *pattern, char byte, bool *found) {
     const unsigned char c = (unsigned char)byte;
     const bool others = *pattern == '!' || *pattern == '^';
@@ -311,7 +307,7 @@ static const char *match_set(const char *pattern, char byte, bool *found) {
     return at + 1;
 }
 
-/* One step that is no "*": moves both on, or tells that they differ. */
+/* Matches one character with a pattern that is no "*", and moves both on. */
 static bool match_one(const char **pattern, const char **text) {
     const char *p = *pattern;
     bool found = false;
@@ -331,7 +327,7 @@ static bool match_one(const char **pattern, const char **text) {
     return *p == *(*text)++;
 }
 
-/* Only the last "*" is ever gone back to: what the ones before it took is as good as any (Krauss, "Matching
+/* A mismatch only goes back to the last "*": the matches of earlier ones need no change (Krauss, "Matching
  * wildcards", 2008). */
 static bool glob(const char *pattern, const char *text) {
     const char *star = NULL, *resume = NULL;
@@ -353,12 +349,12 @@ static bool glob(const char *pattern, const char *text) {
     return *pattern == '\0';
 }
 
-/* A name with brackets in it is to be found by itself, too. */
+/* A name with brackets must match itself, too. */
 static bool matches(const char *name, const char *pattern) {
     return strcmp(name, pattern) == 0 || glob(pattern, name);
 }
 
-int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern) {
+int32_t vshi_mesh_matches(const vsh_mesh *mesh, const char *pattern) {
     if (mesh == NULL || pattern == NULL) {
         return 0;
     }
@@ -369,7 +365,7 @@ int32_t vsh_mesh_matches(const vsh_mesh *mesh, const char *pattern) {
     }
     const char *name = mesh->name, *object = mesh->object_name;
     if (name == NULL && object == NULL) {
-        return matches("", pattern); /* as messages call it */
+        return matches("", pattern);
     }
     if ((name != NULL && matches(name, pattern)) || (object != NULL && matches(object, pattern))) {
         return 1;

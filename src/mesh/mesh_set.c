@@ -5,9 +5,10 @@
 #include "base/memory.h"
 #include "mesh/alpha_mask.h"
 
+#include <float.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <vdbshade/solidity.h>
+#include <vdbshade/mesh.h>
 
 const struct vsh_checked_mesh *vshi_mesh_known(const vsh_mesh *mesh) {
     const struct vsh_checked_mesh *known = mesh->checked;
@@ -33,6 +34,26 @@ vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *e
     return vshi_mesh_known(mesh) != NULL ? VSH_OK : vshi_mesh_validate(mesh, index, error);
 }
 
+/* Validates a mesh, and fills the report except for its edges. */
+static vsh_result check_mesh(const vsh_mesh *mesh, size_t index, vsh_mesh_report *report, vsh_error *error) {
+    VSHI_TRY(vshi_mesh_validate(mesh, index, error));
+    *report = (vsh_mesh_report){.bounds_min = {DBL_MAX, DBL_MAX, DBL_MAX},
+                                .bounds_max = {-DBL_MAX, -DBL_MAX, -DBL_MAX}};
+    for (size_t i = 0; i < mesh->triangle_count; ++i) {
+        if (vshi_mesh_degenerate(mesh, i)) {
+            ++report->degenerate_triangles;
+            continue;
+        }
+        vshi_vec corner[3];
+        vshi_mesh_triangle(mesh, i, corner);
+        report->area += vshi_triangle_area(corner);
+        for (int k = 0; k < 3; ++k) {
+            vshi_grow_box(report->bounds_min, report->bounds_max, corner[k]);
+        }
+    }
+    return VSH_OK;
+}
+
 vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_set *set, vsh_error *error) {
     *set = (vshi_mesh_set){0};
     VSHI_TRY(vshi_allocate((void **)&set->meshes, count, sizeof *set->meshes, "meshes", error));
@@ -44,7 +65,7 @@ vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_
         if (known != NULL) {
             *own = *known;
         } else {
-            VSHI_TRY(vshi_mesh_look_over(&meshes[m], m, &own->report, error));
+            VSHI_TRY(check_mesh(&meshes[m], m, &own->report, error));
         }
         set->meshes[m] = meshes[m];
         if (meshes[m].mask != NULL) {
@@ -65,11 +86,10 @@ void vshi_mesh_set_free(vshi_mesh_set *set) {
     *set = (vshi_mesh_set){0};
 }
 
-/* The solidity of just these meshes, in this order; NULL if they were not looked at together. */
+/* The solidity of exactly these meshes, in this order; NULL if they were not analysed together. */
 static const vshi_solidity *known_together(const vshi_mesh_set *set) {
     const vshi_solidity *solidity = set->count > 0 ? set->checked[0].solidity : NULL;
-    const vshi_wholes *wholes = solidity != NULL ? vshi_solidity_wholes(solidity) : NULL;
-    if (wholes == NULL || wholes->first[wholes->count] != set->count) {
+    if (solidity == NULL || solidity->mesh_count != set->count) {
         return NULL;
     }
     for (size_t m = 0; m < set->count; ++m) {
@@ -128,15 +148,13 @@ vsh_result vsh_mesh_solidity(const vsh_mesh *meshes, size_t mesh_count, const vs
     vsh_result result;
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
-    const vshi_wholes *wholes = vshi_solidity_wholes(set.solidity);
-    for (size_t w = 0; w < wholes->count; ++w) {
+    const vshi_solidity *s = set.solidity;
+    for (size_t w = 0; w < s->wholes.count; ++w) {
         vsh_solidity_report report = {0};
-        size_t count;
-        const vshi_component *components = vshi_solidity_of_whole(set.solidity, w, &count);
-        for (size_t i = 0; i < count; ++i) {
-            add_component(&components[i], &report);
+        for (size_t i = s->first[w]; i < s->first[w + 1]; ++i) {
+            add_component(&s->components[i], &report);
         }
-        for (size_t m = wholes->first[w]; m < wholes->first[w + 1]; ++m) {
+        for (size_t m = s->wholes.first[w]; m < s->wholes.first[w + 1]; ++m) {
             reports[m] = report;
         }
     }
@@ -150,26 +168,25 @@ static const char *plural(size_t count) {
 }
 
 void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, const vsh_run *run) {
-    const vshi_wholes *wholes = vshi_solidity_wholes(set->solidity);
+    const vshi_solidity *s = set->solidity;
     char as[96] = "a sheet, with air on both sides";
     if (shell > 0.0) {
         snprintf(as, sizeof as, "a shell %g voxels (%g units) thick", shell, shell * voxel);
     }
-    for (size_t w = 0; vshi_wants_notes(run) && w < wholes->count; ++w) {
-        size_t count = 0;
-        const vshi_component *components = vshi_solidity_of_whole(set->solidity, w, &count);
-        const vsh_mesh *whole = &wholes->meshes[w];
+    for (size_t w = 0; vshi_wants_notes(run) && w < s->wholes.count; ++w) {
+        const vsh_mesh *whole = &s->wholes.meshes[w];
         if (whole->alpha == VSH_ALPHA_MASKED && whole->solidity == VSH_SOLIDITY_SHELL) {
             continue; /* masked meshes are sheets on purpose */
         }
-        const size_t first = wholes->first[w];
+        const size_t first = s->wholes.first[w], count = s->first[w + 1] - s->first[w];
         vsh_solidity_report t = {0};
         size_t sheet_edges = 0;
         bool around_all = false;
-        for (size_t i = 0; i < count; ++i) {
-            add_component(&components[i], &t);
-            sheet_edges += components[i].kind == VSHI_KIND_SHEET ? components[i].open_edges : 0;
-            around_all = around_all || components[i].around_all;
+        for (const vshi_component *c = s->components + s->first[w]; c < s->components + s->first[w + 1];
+             ++c) {
+            add_component(c, &t);
+            sheet_edges += c->kind == VSHI_KIND_SHEET ? c->open_edges : 0;
+            around_all = around_all || c->around_all;
         }
         char name[220];
         snprintf(name, sizeof name, "%s (%zu of %zu)", vshi_mesh_label(&set->meshes[first], first).text,
@@ -188,15 +205,15 @@ void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, co
             vshi_note(
                 run,
                 "%s: %zu open edge%s around %zu hole%s in %zu of %zu component%s that enclose nearly all "
-                "behind them: taken for solid, closed over the holes",
+                "behind them: treated as solid, closed over the holes",
                 name, t.open_edges, plural(t.open_edges), t.holes, plural(t.holes), t.closed_over, count,
                 plural(count));
         }
         if (t.turned_triangles > 0) {
-            vshi_note(run,
-                      "%s: %zu triangle%s that face the other way than those around: taken as if they were "
-                      "turned over",
-                      name, t.turned_triangles, plural(t.turned_triangles));
+            vshi_note(
+                run,
+                "%s: %zu triangle%s that face the other way than their neighbours: treated as turned over",
+                name, t.turned_triangles, plural(t.turned_triangles));
         }
     }
 }
@@ -206,7 +223,7 @@ vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_err
     VSHI_NEEDS(mesh);
     VSHI_NEEDS(report);
     vsh_mesh_report found;
-    VSHI_TRY(vshi_mesh_look_over(mesh, VSHI_MESH_ALONE, &found, error));
+    VSHI_TRY(check_mesh(mesh, VSHI_MESH_ALONE, &found, error));
     VSHI_TRY(vshi_mesh_count_edges(mesh, &found, error));
     *report = found;
     return VSH_OK;

@@ -6,13 +6,11 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "mesh/edges.h"
-#include "mesh/mesh_set.h"
-#include "mesh/weld.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Some of a mesh's triangles, of which some are turned over. */
+/* A list of a mesh's triangles. Some are turned over. */
 typedef struct surface_part {
     const vsh_mesh *mesh;
     const uint32_t *list; /* [count] */
@@ -20,45 +18,25 @@ typedef struct surface_part {
     const uint8_t *turned; /* of the mesh's triangles */
 } surface_part;
 
-struct vshi_solidity {
-    vshi_wholes wholes;
-    vshi_components *found; /* [wholes.count]: as they are by themselves */
-    bool *lent;             /* [wholes.count]: of another solidity, where a whole was found before */
-    size_t mesh_count;
-    uint8_t *turned;    /* copies of found[].turned; later decisions change them */
-    uint8_t *sides;     /* of all meshes */
-    uint8_t *holed;     /* likewise */
-    size_t *first_side; /* [mesh_count + 1] */
-    vshi_component *components;
-    size_t count;
-    size_t *first; /* [wholes.count + 1]: the wholes' first components */
-    vshi_vec (*caps)[3];
-    size_t cap_count;
-    vshi_cut *cuts;
-    size_t cut_count, cut_capacity;
-};
-
-/* Of the triangles of the component's whole: which run against what their component faces. */
+/* `turned` of the triangles of the component's whole. */
 static inline uint8_t *turned_of(const vshi_solidity *s, const vshi_component *component) {
     return s->turned + s->first_side[s->wholes.first[component->whole]];
 }
 
-/* --- solids, walls and sheets, each component for itself */
+/* --- solids, walls and sheets, by one component alone */
 
 /* An open surface that encloses this share counts as closed. Measured solids: a ball with small holes has
  * 0.98 and more, a head open at its neck 0.95, a tree's trunk 0.96. Measured sheets: a cup has 0.91, a box
  * without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A cup that is
  * filled by mistake buries its content, so the limit is above it. */
-#define VSHI_SOLID_ENCLOSES 0.945
-
-/* Of one that looks inwards: nothing is filled behind its faces but a thin wall, so that a room may lack a
- * whole side. */
+static const double SOLID_ENCLOSES = 0.945;
+/* The same if it looks inwards: its faces get a thin wall only, so a room may lack a whole side. */
 static const double WALL_ENCLOSES = 0.86;
-/* Of the area, at least, that must look inwards: where faces disagree more, what is closed is solid. */
+/* Least share of the area that must look inwards. If faces disagree more, a closed component is solid. */
 static const double INWARD_SHARE = 2.0 / 3.0;
-/* Volume over the area to the power of 1.5: less is what rounding leaves of none. A sphere has 0.094. */
+/* Least volume over the area to the power of 1.5: rounding of no volume is less, a sphere has 0.094. */
 static const double LEAST_VOLUME = 1e-6;
-/* Of the area that is given once more facing the other way: such faces are double-sided sheets. */
+/* Share of the area that has a duplicate facing the other way: such faces are double-sided sheets. */
 static const double DOUBLED_SHARE = 0.5;
 
 /* --- generalized winding numbers (A. Jacobson, L. Kavan, O. Sorkine-Hornung, "Robust inside-outside
@@ -67,8 +45,7 @@ static const double DOUBLED_SHARE = 0.5;
 
 static const double PI = 3.14159265358979323846;
 
-/* Points of a surface from which part_encloses() looks. It takes fewer where the surface has many open edges,
- * to sum no more solid angles than this. */
+/* Sample points of part_encloses(). It uses fewer for many open edges, to limit the sum of solid angles. */
 enum { MOST_SAMPLES = 128, FEWEST_SAMPLES = 16, MOST_ANGLES = 1 << 21 };
 
 /* World corners of a triangle that a part lists. */
@@ -89,15 +66,15 @@ static double solid_angle(const vshi_vec corner[3], vshi_vec point) {
                    c = vshi_sub(corner[2], point);
     const double la = vshi_length(a), lb = vshi_length(b), lc = vshi_length(c);
     const double over = vshi_dot(a, vshi_cross(b, c));
-    if (over == 0.0) { /* in its plane: on it, half of the sphere on either side */
+    if (over == 0.0) { /* the point is in the triangle's plane */
         return 0.0;
     }
     return 2.0 *
            vshi_atan2(over, la * lb * lc + vshi_dot(a, b) * lc + vshi_dot(b, c) * la + vshi_dot(c, a) * lb);
 }
 
-/* How often a part goes around a point: 1 inside of a closed surface, 0 outside of it; between them where it
- * is open, and 1/2 on it. */
+/* How often a part winds around a point: 1 inside of a closed surface, 0 outside, 1/2 on it, and between
+ * these for an open one. */
 static double find_winding(const surface_part *part, vshi_vec point) {
     double sum = 0.0;
     for (size_t at = 0; at < part->count; ++at) {
@@ -110,26 +87,18 @@ static double find_winding(const surface_part *part, vshi_vec point) {
 
 /* Uses the fractions of the additive sequence of the plastic number (M. Roberts, 2018). */
 vshi_vec vshi_point_in(const vshi_vec corner[3], size_t number) {
-    double u = 0.5 + 0.7548776662466927 * (double)number, v = 0.5 + 0.5698402909980532 * (double)number;
-    u -= floor(u);
-    v -= floor(v);
-    if (u + v > 1.0) {
-        u = 1.0 - u;
-        v = 1.0 - v;
-    }
-    return vshi_add(corner[0], vshi_add(vshi_scale(vshi_sub(corner[1], corner[0]), u),
-                                        vshi_scale(vshi_sub(corner[2], corner[0]), v)));
+    const double u = 0.5 + 0.7548776662466927 * (double)number, v = 0.5 + 0.5698402909980532 * (double)number;
+    return vshi_triangle_point(corner, u - floor(u), v - floor(v));
 }
 
-/* `count` points spread over a part by area. */
+/* Spreads `count` points over a part by area. */
 static void spread_samples(const surface_part *part, double area, size_t count, vshi_vec *samples) {
     double reached = 0.0;
     size_t next = 0;
     vshi_vec corner[3] = {{0.0, 0.0, 0.0}};
     for (size_t at = 0; at < part->count && next < count; ++at) {
         part_corners(part, at, corner);
-        reached +=
-            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+        reached += vshi_triangle_area(corner);
         while (next < count && reached >= area * ((double)next + 0.5) / (double)count) {
             samples[next] = vshi_point_in(corner, next);
             ++next;
@@ -141,8 +110,8 @@ static void spread_samples(const surface_part *part, double area, size_t count, 
 }
 
 /* The share of one of its sides that a part encloses: 1 if it is closed, 1/2 for a plane. `caps` are
- * triangles over its holes. A surface and what closes it go around a point a whole number of times, so that
- * what the surface itself lacks of one is what its caps go around it: only those need to be summed. */
+ * triangles over its holes. A surface with its caps winds around a point a whole number of times, so the
+ * caps' winding alone tells what the surface lacks. */
 static double part_encloses(const surface_part *part, double area, const vshi_vec (*caps)[3],
                             size_t cap_count) {
     if (cap_count == 0) {
@@ -171,9 +140,11 @@ typedef struct measure {
     double turned_area, doubled_area;
 } measure;
 
-static void grow(vshi_component *c, vshi_vec p) {
-    c->low = (vshi_vec){fmin(c->low.x, p.x), fmin(c->low.y, p.y), fmin(c->low.z, p.z)};
-    c->high = (vshi_vec){fmax(c->high.x, p.x), fmax(c->high.y, p.y), fmax(c->high.z, p.z)};
+static const vshi_vec LOWEST = {-INFINITY, -INFINITY, -INFINITY}, HIGHEST = {INFINITY, INFINITY, INFINITY};
+
+static void grow(vshi_vec *low, vshi_vec *high, vshi_vec p) {
+    *low = (vshi_vec){fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z)};
+    *high = (vshi_vec){fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z)};
 }
 
 /* Six times the volume of the tetrahedron over a triangle from `origin`. */
@@ -193,21 +164,20 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
     measure m = {0.0, 0.0};
     double volume = 0.0;
     vshi_vec origin = {0.0, 0.0, 0.0};
-    c->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
-    c->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    c->low = HIGHEST;
+    c->high = LOWEST;
     for (size_t at = 0; at < c->triangles; ++at) {
         const uint32_t i = c->list[at];
         vshi_vec corner[3];
         part_corners(&part, at, corner);
         origin = at == 0 ? corner[0] : origin;
-        const double area =
-            0.5 * vshi_length(vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0])));
+        const double area = vshi_triangle_area(corner);
         c->area += area;
         m.turned_area += part.turned[i] ? area : 0.0;
         m.doubled_area += found->doubled[i] ? area : 0.0;
         volume += volume_from(corner, origin);
         for (int k = 0; k < 3; ++k) {
-            grow(c, corner[k]);
+            grow(&c->low, &c->high, corner[k]);
         }
     }
     for (size_t k = 0; k < c->open_edges; ++k) {
@@ -217,21 +187,20 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
     return m;
 }
 
-/* Turns what encloses something to face the other way. */
+/* Turns a component and its caps over. */
 static void turn_component(vshi_solidity *s, vshi_component *c) {
     uint8_t *turned = turned_of(s, c);
     for (size_t at = 0; at < c->triangles; ++at) {
         turned[c->list[at]] ^= 1;
     }
     for (size_t k = 0; k < c->open_edges; ++k) {
-        vshi_vec *corner = s->caps[(size_t)(c->cap - (const vshi_vec(*)[3])s->caps) + k];
-        const vshi_vec swapped = corner[0];
-        corner[0] = corner[1];
-        corner[1] = swapped;
+        const vshi_vec swapped = c->cap[k][0];
+        c->cap[k][0] = c->cap[k][1];
+        c->cap[k][1] = swapped;
     }
 }
 
-/* --- holes: each group of open edges that hang together is closed by triangles to its middle */
+/* --- holes: triangles to its middle close each connected group of open edges */
 
 typedef struct hole {
     vshi_vec sum; /* the middles of its edges, by their lengths */
@@ -283,7 +252,7 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     const vshi_components *found = &s->found[c->whole];
     const bool twisted = found->twisted[(size_t)(c - s->components) - s->first[c->whole]] != 0;
     double turned_area = m->turned_area;
-    if (turned_area > 0.5 * c->area) { /* most are right */
+    if (turned_area > 0.5 * c->area) { /* most faces are right */
         turn_component(s, c);
         turned_area = c->area - turned_area;
         c->volume = -c->volume;
@@ -305,7 +274,7 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
     const surface_part part = part_of(s, c);
     c->enclosed = part_encloses(&part, c->area, c->cap, c->open_edges);
     const bool single = m->doubled_area < DOUBLED_SHARE * c->area;
-    const bool encloses = c->enclosed >= (inward ? WALL_ENCLOSES : VSHI_SOLID_ENCLOSES) && single;
+    const bool encloses = c->enclosed >= (inward ? WALL_ENCLOSES : SOLID_ENCLOSES) && single;
     if (asked != VSH_SOLIDITY_SHELL && (encloses || asked != VSH_SOLIDITY_AUTO)) {
         c->kind = inward ? VSHI_KIND_WALL : VSHI_KIND_SOLID;
         c->inward = inward;
@@ -314,17 +283,9 @@ static void decide(vshi_solidity *s, vshi_component *c, const measure *m) {
                 agreed && single;
 }
 
-/* Wholes that are looked at, each for itself. */
-typedef struct telling {
-    vshi_solidity *s;
-    size_t *first_cap; /* [wholes] */
-} telling;
-
-/* A vshi_element_fn over wholes. */
-static vsh_result find_of_whole(void *user, size_t whole, vsh_error *error) {
-    const telling *t = user;
-    vshi_solidity *s = t->s;
-    size_t caps = t->first_cap[whole];
+/* A vshi_element_fn over wholes: measures the components, closes their holes, and decides their kinds. */
+static vsh_result measure_whole(void *user, size_t whole, vsh_error *error) {
+    vshi_solidity *s = user;
     const vshi_components *found = &s->found[whole];
     closing k = {.mesh = &s->wholes.meshes[whole]};
     const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
@@ -336,15 +297,14 @@ static vsh_result find_of_whole(void *user, size_t whole, vsh_error *error) {
         vshi_component *c = &s->components[s->first[whole] + i];
         *c = (vshi_component){.whole = (uint32_t)whole,
                               .triangles = found->begin[i + 1] - found->begin[i],
-                              .list = found->list + found->begin[i],
-                              .cap = s->caps != NULL ? (const vshi_vec(*)[3])(s->caps + caps) : NULL};
+                              .list = found->list + found->begin[i]};
         while (rim + c->open_edges < found->rim_count && found->rims[rim + c->open_edges].component == i) {
             ++c->open_edges;
         }
-        if (c->open_edges > 0) { // where no edge is open there is no memory of them
-            c->holes = close_holes(&k, found->rims + rim, c->open_edges, s->caps + caps);
+        if (c->open_edges > 0) {
+            c->cap = s->caps + s->first_cap[whole] + rim;
+            c->holes = close_holes(&k, found->rims + rim, c->open_edges, c->cap);
             rim += c->open_edges;
-            caps += c->open_edges;
         }
         const measure m = measure_component(s, c);
         decide(s, c, &m);
@@ -356,32 +316,21 @@ done:
     return result;
 }
 
-/* Measures all components, closes their holes, and tells sheets, solids and walls apart, each for itself. */
-static vsh_result find_kinds(vshi_solidity *s, vshi_job *job, vsh_error *error) {
-    telling t = {.s = s};
-    VSHI_TRY(vshi_allocate((void **)&t.first_cap, s->wholes.count + 1, sizeof *t.first_cap, "holes", error));
-    for (size_t w = 0; w < s->wholes.count; ++w) {
-        t.first_cap[w + 1] = t.first_cap[w] + s->found[w].rim_count;
-    }
-    const vsh_result result = vshi_parallel_each(job, s->wholes.count, 1, 0, find_of_whole, &t, error);
-    free(t.first_cap);
-    return result;
-}
-
-/* --- which of the components that look inwards are rooms in solids */
+/* --- rooms: components that look inwards and lie in solids */
 
 enum { SAMPLES = 24, AROUND_SAMPLES = 8, DOME_ANGLES = 1 << 24 };
 
 /* Shares of a room's samples. With the first in any solids it is a room. With the second in one solid it is
- * cut out of that one; a pillar that only reaches into the wall is left to stand in it. */
+ * cut out of that one; a pillar that only reaches into the wall is not. */
 static const double ROOM_SHARE = 0.5, CUT_SHARE = 0.25;
-/* A sample goes a whole number of times around what it does not lie on: nearer to 1/2 than this it does. */
+/* A sample whose winding number is nearer to 1/2 than this lies on the surface. */
 static const double ON_SURFACE = 0.25;
 
+/* A room's samples, and what is known of the solids around it. */
 typedef struct surrounding {
     vshi_vec samples[SAMPLES];
     bool inside[SAMPLES]; /* of any solid */
-    size_t cuts;          /* found so far: of this room */
+    size_t cuts;          /* of this room, so far */
     bool coincides;       /* with a solid's own surface */
 } surrounding;
 
@@ -390,15 +339,9 @@ static bool in_box(const vshi_component *c, vshi_vec p) {
            p.z <= c->high.z;
 }
 
-static vsh_result add_cut(vshi_solidity *s, size_t room, size_t solid, vsh_error *error) {
-    VSHI_TRY(
-        vshi_make_room((void **)&s->cuts, s->cut_count, &s->cut_capacity, sizeof *s->cuts, "rooms", error));
-    s->cuts[s->cut_count++] = (vshi_cut){(uint32_t)room, (uint32_t)solid};
-    return VSH_OK;
-}
-
-/* Looks at how a room lies in one solid. */
-static vsh_result look(vshi_solidity *s, size_t room, size_t solid, surrounding *around, vsh_error *error) {
+/* Compares a room with one solid. */
+static vsh_result compare_room(vshi_solidity *s, size_t room, size_t solid, surrounding *around,
+                               vsh_error *error) {
     vshi_component *c = &s->components[solid];
     const surface_part part = part_of(s, c);
     size_t inside = 0, on = 0;
@@ -416,15 +359,18 @@ static vsh_result look(vshi_solidity *s, size_t room, size_t solid, surrounding 
     }
     const bool found = s->wholes.meshes[c->whole].solidity == VSH_SOLIDITY_AUTO &&
                        s->wholes.meshes[s->components[room].whole].solidity == VSH_SOLIDITY_AUTO;
-    if (found && (double)on > ROOM_SHARE * SAMPLES) { /* faces of both sides: air within, air outside */
+    if (found && (double)on > ROOM_SHARE * SAMPLES) { /* doubled faces: air within, air outside */
         c->kind = VSHI_KIND_SHEET;
         around->coincides = true;
     }
     if ((double)inside < CUT_SHARE * SAMPLES) {
         return VSH_OK;
     }
+    VSHI_TRY(
+        vshi_make_room((void **)&s->cuts, s->cut_count, &s->cut_capacity, sizeof *s->cuts, "rooms", error));
+    s->cuts[s->cut_count++] = (vshi_cut){(uint32_t)room, (uint32_t)solid};
     ++around->cuts;
-    return add_cut(s, room, solid, error);
+    return VSH_OK;
 }
 
 static vsh_result find_room(vshi_solidity *s, size_t room, vsh_error *error) {
@@ -437,7 +383,7 @@ static vsh_result find_room(vshi_solidity *s, size_t room, vsh_error *error) {
         if (solid->kind == VSHI_KIND_SOLID && solid->low.x <= c->high.x && solid->high.x >= c->low.x &&
             solid->low.y <= c->high.y && solid->high.y >= c->low.y && solid->low.z <= c->high.z &&
             solid->high.z >= c->low.z) {
-            VSHI_TRY(look(s, room, i, &around, error));
+            VSHI_TRY(compare_room(s, room, i, &around, error));
         }
     }
     size_t inside = 0;
@@ -453,9 +399,9 @@ static vsh_result find_room(vshi_solidity *s, size_t room, vsh_error *error) {
     return VSH_OK;
 }
 
-/* A house whose skin has holes and an open room within: light goes from the one to the other, so neither is
+/* Makes walls of solids that have holes and an open room: light passes from one to the other, so neither is
  * closed over its holes. Returns whether there was one. */
-static bool hollow(vshi_solidity *s) {
+static bool open_houses(vshi_solidity *s) {
     bool found = false;
     for (size_t i = 0; i < s->cut_count; ++i) {
         vshi_component *solid = &s->components[s->cuts[i].solid];
@@ -467,7 +413,7 @@ static bool hollow(vshi_solidity *s) {
     return found;
 }
 
-/* A dome has at least this share of the samples of all other components within. */
+/* Least share of the samples of all other components that lie within a dome. */
 static const double AROUND_SHARE = 0.95;
 
 /* Counts the samples of a component that lie in a solid. */
@@ -482,37 +428,36 @@ static size_t count_within(const vshi_solidity *s, const vshi_component *solid, 
     return within;
 }
 
-/* The content of a dome is smaller than this share of it, or has more than solids. Eyes in a head and an
- * engine in its hood are solids alone, and of about the size around them. */
+/* The content of a dome is smaller than this share of it, or is not all solids. Eyes in a head and an engine
+ * in its hood are solids, and about as large. */
 static const double DOME_SHARE = 0.5;
 
 static double longest(vshi_vec size) {
     return fmax(size.x, fmax(size.y, size.z));
 }
 
-/* Whether what lies within `dome` is what a sky dome has within. */
+/* Whether all other components may be the content of a sky dome. */
 static bool fits_a_dome(const vshi_solidity *s, const vshi_component *dome) {
-    vshi_vec low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
+    vshi_vec low = HIGHEST, high = LOWEST;
     bool solids = true;
     for (size_t i = 0; i < s->count; ++i) {
         const vshi_component *c = &s->components[i];
         if (c != dome) {
             solids = solids && c->kind == VSHI_KIND_SOLID;
-            low = (vshi_vec){fmin(low.x, c->low.x), fmin(low.y, c->low.y), fmin(low.z, c->low.z)};
-            high = (vshi_vec){fmax(high.x, c->high.x), fmax(high.y, c->high.y), fmax(high.z, c->high.z)};
+            grow(&low, &high, c->low);
+            grow(&low, &high, c->high);
         }
     }
     return !solids || longest(vshi_sub(high, low)) < DOME_SHARE * longest(vshi_sub(dome->high, dome->low));
 }
 
 /* Finds a sky dome whose faces look outwards: a closed solid around everything else, without a room. As a
- * solid it would bury all that it is to surround. */
+ * solid it would bury its content. */
 static void find_dome(vshi_solidity *s) {
     vshi_component *dome = NULL;
     double largest = 0.0;
     for (size_t i = 0; i < s->count; ++i) {
-        const vshi_vec size = vshi_sub(s->components[i].high, s->components[i].low);
-        const double across = vshi_length(size);
+        const double across = vshi_length(vshi_sub(s->components[i].high, s->components[i].low));
         if (across > largest) {
             largest = across;
             dome = &s->components[i];
@@ -550,7 +495,7 @@ static int compare_cuts(const void *a, const void *b) {
     return (x->room > y->room) - (x->room < y->room);
 }
 
-/* Tells rooms from walls by the solids around them, and finds the solids that rooms are cut out of. */
+/* Separates rooms from walls by the solids around them, and finds the solids that rooms are cut out of. */
 static vsh_result find_rooms(vshi_solidity *s, vsh_error *error) {
     do {
         s->cut_count = 0;
@@ -560,7 +505,7 @@ static vsh_result find_rooms(vshi_solidity *s, vsh_error *error) {
                 VSHI_TRY(find_room(s, i, error));
             }
         }
-    } while (hollow(s));
+    } while (open_houses(s));
     find_dome(s);
     if (s->cut_count > 1) {
         qsort(s->cuts, s->cut_count, sizeof *s->cuts, compare_cuts);
@@ -568,19 +513,19 @@ static vsh_result find_rooms(vshi_solidity *s, vsh_error *error) {
     return VSH_OK;
 }
 
-/* The most memory for a triangle and for a vertex, while edges are found and afterwards. */
+/* Peak memory for a triangle and for a vertex. */
 static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
-/* The same of terrains, whose edges are known. */
+/* The same for terrains, whose edges are known. */
 static const double TERRAIN_BYTES_PER_TRIANGLE = 9.0, TERRAIN_BYTES_PER_VERTEX = 4.0;
 
-/* --- objects put together from their parts */
+/* --- objects joined from their parts */
 
 static bool one_object(const vsh_mesh *a, const vsh_mesh *b) {
     return a->object != 0 && a->object == b->object && a->solidity == b->solidity &&
            vshi_mesh_same_transform(a->transform, b->transform);
 }
 
-static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes *w, vsh_error *error) {
+static vsh_result join_parts(const vsh_mesh *parts, size_t count, vshi_wholes *w, vsh_error *error) {
     vsh_mesh *whole = &w->meshes[w->count];
     *whole = parts[0];
     for (size_t i = 1; i < count; ++i) {
@@ -612,11 +557,10 @@ static vsh_result put_together(const vsh_mesh *parts, size_t count, vshi_wholes 
     return VSH_OK;
 }
 
-static vsh_result wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wholes *w, vsh_error *error) {
+static vsh_result make_wholes(const vsh_mesh *meshes, size_t mesh_count, vshi_wholes *w, vsh_error *error) {
     *w = (vshi_wholes){0};
     const vshi_array arrays[] = {VSHI_ARRAY(w->meshes, mesh_count), VSHI_ARRAY(w->first, mesh_count + 1),
-                                 VSHI_ARRAY(w->of, mesh_count), VSHI_ARRAY(w->positions, mesh_count),
-                                 VSHI_ARRAY(w->indices, mesh_count)};
+                                 VSHI_ARRAY(w->positions, mesh_count), VSHI_ARRAY(w->indices, mesh_count)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "objects", error));
     for (size_t m = 0, next; m < mesh_count; m = next) {
         size_t vertices = meshes[m].vertex_count;
@@ -625,43 +569,37 @@ static vsh_result wholes_make(const vsh_mesh *meshes, size_t mesh_count, vshi_wh
              ++next) {
             vertices += meshes[next].vertex_count;
         }
-        const vsh_result result = put_together(meshes + m, next - m, w, error);
-        for (size_t part = m; part < next; ++part) {
-            w->of[part] = w->count;
-        }
-        w->first[++w->count] = next; /* wholes_free() frees it after a failure too */
+        const vsh_result result = join_parts(meshes + m, next - m, w, error);
+        w->first[++w->count] = next; /* free_wholes() frees it after a failure too */
         VSHI_TRY(result);
     }
     return VSH_OK;
 }
 
-static void wholes_free(vshi_wholes *w) {
+static void free_wholes(vshi_wholes *w) {
     for (size_t i = 0; i < w->count; ++i) {
         free(w->positions[i]);
         free(w->indices[i]);
     }
     free(w->indices);
     free(w->positions);
-    free(w->of);
     free(w->first);
     free(w->meshes);
-    *w = (vshi_wholes){0};
 }
 
-/* --- what is solid */
+/* --- the whole analysis */
 
 static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side, "what is solid",
-                           error));
+    VSHI_TRY(
+        vshi_allocate((void **)&s->first_side, s->mesh_count + 1, sizeof *s->first_side, "solids", error));
     for (size_t m = 0; m < s->mesh_count; ++m) {
         s->first_side[m + 1] = s->first_side[m] + meshes[m].triangle_count;
     }
-    const size_t triangles = s->first_side[s->mesh_count];
-    const vshi_array arrays[] = {
-        VSHI_ARRAY(s->found, s->wholes.count),     VSHI_ARRAY(s->lent, s->wholes.count),
-        VSHI_ARRAY(s->first, s->wholes.count + 1), VSHI_ARRAY(s->turned, triangles),
-        VSHI_ARRAY(s->sides, triangles),           VSHI_ARRAY(s->holed, triangles)};
-    return VSHI_ALLOCATE_ALL(arrays, "what is solid", error);
+    const size_t triangles = s->first_side[s->mesh_count], wholes = s->wholes.count;
+    const vshi_array arrays[] = {VSHI_ARRAY(s->found, wholes),         VSHI_ARRAY(s->first, wholes + 1),
+                                 VSHI_ARRAY(s->first_cap, wholes + 1), VSHI_ARRAY(s->turned, triangles),
+                                 VSHI_ARRAY(s->sides, triangles),      VSHI_ARRAY(s->holed, triangles)};
+    return VSHI_ALLOCATE_ALL(arrays, "solids", error);
 }
 
 static void set_sides(vshi_solidity *s) {
@@ -680,63 +618,28 @@ static void set_sides(vshi_solidity *s) {
     }
 }
 
-/* The components of a whole of these meshes, where another solidity found them; else NULL. */
-static const vshi_components *find_known(const vsh_mesh *meshes, const vshi_wholes *wholes, size_t whole) {
-    const size_t first = wholes->first[whole], count = wholes->first[whole + 1] - first;
-    const struct vsh_checked_mesh *known = vshi_mesh_known(&meshes[first]);
-    const vshi_solidity *s = known != NULL ? known->solidity : NULL;
-    for (size_t m = 0; m < count; ++m) {
-        const struct vsh_checked_mesh *part = vshi_mesh_known(&meshes[first + m]);
-        if (s == NULL || part == NULL || part->solidity != s || part->place != known->place + m) {
-            return NULL;
-        }
-    }
-    const size_t place = s->wholes.of[known->place];
-    return s->wholes.first[place] == known->place && s->wholes.first[place + 1] == known->place + count
-               ? &s->found[place]
-               : NULL;
-}
-
-/* Wholes that are looked at, each for itself. */
-typedef struct finding {
-    vshi_solidity *s;
-    const vsh_mesh *meshes;
-} finding;
-
-/* A vshi_element_fn over wholes. */
-static vsh_result find_whole(void *user, size_t w, vsh_error *error) {
-    const finding *f = user;
-    vshi_solidity *s = f->s;
-    const vshi_components *known = find_known(f->meshes, &s->wholes, w);
-    if (known != NULL) {
-        s->found[w] = *known;
-        s->lent[w] = true;
-    } else {
-        VSHI_TRY(vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], error));
-    }
+/* A vshi_element_fn over wholes: finds the components. */
+static vsh_result find_components(void *user, size_t w, vsh_error *error) {
+    vshi_solidity *s = user;
     const size_t triangles = s->wholes.meshes[w].triangle_count;
+    VSHI_TRY(vshi_components_find(&s->wholes.meshes[w], w, &s->found[w], error));
     if (triangles > 0) {
         memcpy(s->turned + s->first_side[s->wholes.first[w]], s->found[w].turned, triangles);
     }
     return VSH_OK;
 }
 
-static vsh_result find_components(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
-    finding f = {s, meshes};
-    VSHI_TRY(vshi_parallel_each(job, s->wholes.count, 1, 1, find_whole, &f, error));
-    for (size_t w = 0; w < s->wholes.count; ++w) {
+static vsh_result analyse(vshi_solidity *s, vshi_job *job, vsh_error *error) {
+    const size_t wholes = s->wholes.count;
+    VSHI_TRY(vshi_parallel_each(job, wholes, 1, 1, find_components, s, error));
+    for (size_t w = 0; w < wholes; ++w) {
         s->first[w + 1] = s->first[w] + s->found[w].count;
-        s->cap_count += s->found[w].rim_count;
+        s->first_cap[w + 1] = s->first_cap[w] + s->found[w].rim_count;
     }
-    s->count = s->first[s->wholes.count];
-    return VSH_OK;
-}
-
-static vsh_result find(vshi_solidity *s, const vsh_mesh *meshes, vshi_job *job, vsh_error *error) {
-    VSHI_TRY(find_components(s, meshes, job, error));
+    s->count = s->first[wholes];
     VSHI_TRY(vshi_allocate((void **)&s->components, s->count, sizeof *s->components, "components", error));
-    VSHI_TRY(vshi_allocate((void **)&s->caps, s->cap_count, sizeof *s->caps, "holes", error));
-    VSHI_TRY(find_kinds(s, job, error));
+    VSHI_TRY(vshi_allocate((void **)&s->caps, s->first_cap[wholes], sizeof *s->caps, "holes", error));
+    VSHI_TRY(vshi_parallel_each(job, wholes, 1, 0, measure_whole, s, error));
     VSHI_TRY(find_rooms(s, error));
     set_sides(s);
     return VSH_OK;
@@ -753,17 +656,17 @@ vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const
             (known ? TERRAIN_BYTES_PER_TRIANGLE : BYTES_PER_TRIANGLE) * (double)meshes[m].triangle_count +
             (known ? TERRAIN_BYTES_PER_VERTEX : BYTES_PER_VERTEX) * (double)meshes[m].vertex_count;
     }
-    VSHI_TRY(vshi_check_limit(run, bytes, "what is solid", error));
+    VSHI_TRY(vshi_check_limit(run, bytes, "solids", error));
     vshi_solidity *s = NULL;
-    VSHI_TRY(vshi_allocate((void **)&s, 1, sizeof *s, "what is solid", error));
+    VSHI_TRY(vshi_allocate((void **)&s, 1, sizeof *s, "solids", error));
     s->mesh_count = mesh_count;
     vshi_job *job = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(wholes_make(meshes, mesh_count, &s->wholes, error));
+    VSHI_TRY_DONE(make_wholes(meshes, mesh_count, &s->wholes, error));
     VSHI_TRY_DONE(allocate(s, meshes, error));
     job = vshi_job_begin(run, "solids", s->wholes.count);
-    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "what is solid: the system refused memory")
-                         : find(s, meshes, job, error);
+    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "solids: the system refused memory")
+                         : analyse(s, job, error);
 done:
     vshi_job_end(job);
     if (result != VSH_OK) {
@@ -778,22 +681,20 @@ void vshi_solidity_free(vshi_solidity *s) {
     if (s == NULL) {
         return;
     }
+    for (size_t w = 0; s->found != NULL && w < s->wholes.count; ++w) {
+        vshi_components_free(&s->found[w]);
+    }
     free(s->cuts);
     free(s->caps);
     free(s->components);
-    for (size_t m = 0; s->found != NULL && s->lent != NULL && m < s->wholes.count; ++m) {
-        if (!s->lent[m]) {
-            vshi_components_free(&s->found[m]);
-        }
-    }
     free(s->holed);
     free(s->sides);
     free(s->turned);
     free(s->first_side);
+    free(s->first_cap);
     free(s->first);
-    free(s->lent);
     free(s->found);
-    wholes_free(&s->wholes);
+    free_wholes(&s->wholes);
     free(s);
 }
 
@@ -803,23 +704,4 @@ const uint8_t *vshi_solidity_sides(const vshi_solidity *s, size_t mesh) {
 
 const uint8_t *vshi_solidity_holed(const vshi_solidity *s, size_t mesh) {
     return s->holed + s->first_side[mesh];
-}
-
-const vshi_component *vshi_solidity_components(const vshi_solidity *s, size_t *count) {
-    *count = s->count;
-    return s->components;
-}
-
-const vshi_component *vshi_solidity_of_whole(const vshi_solidity *s, size_t whole, size_t *count) {
-    *count = s->first[whole + 1] - s->first[whole];
-    return s->components + s->first[whole];
-}
-
-const vshi_cut *vshi_solidity_cuts(const vshi_solidity *s, size_t *count) {
-    *count = s->cut_count;
-    return s->cuts;
-}
-
-const vshi_wholes *vshi_solidity_wholes(const vshi_solidity *s) {
-    return &s->wholes;
 }

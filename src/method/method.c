@@ -1,5 +1,5 @@
 /* Traits of shadow and AO methods. */
-#include <vdbshade/method.h>
+#include "method/method.h"
 
 enum {
     INNER = VSH_METHOD_INNER,
@@ -35,7 +35,7 @@ uint32_t vsh_shadow_method_traits(int32_t method) {
     return method >= 0 && method < SHADOW_COUNT ? shadow_traits[method] : 0;
 }
 
-int32_t vsh_shadow_method_resolve(int32_t method, int32_t has_triangles) {
+int32_t vshi_shadow_method_resolve(int32_t method, int32_t has_triangles) {
     return method != VSH_SHADOW_AUTO ? method
            : has_triangles != 0      ? (int32_t)VSH_SHADOW_EXACT
                                      : (int32_t)VSH_SHADOW_ADAPTIVE;
@@ -45,7 +45,7 @@ uint32_t vsh_ao_method_traits(int32_t method) {
     return method >= 0 && method < AO_COUNT ? ao_traits[method] : 0;
 }
 
-int32_t vsh_ao_method_resolve(int32_t method, int32_t has_triangles) {
+int32_t vshi_ao_method_resolve(int32_t method, int32_t has_triangles) {
     return method != VSH_AO_AUTO ? method
            : has_triangles != 0  ? (int32_t)VSH_AO_EXACT
                                  : (int32_t)VSH_AO_ADAPTIVE;

@@ -1,9 +1,9 @@
-/* Formats that Assimp reads: STL, Collada and FBX. First the file's own bytes are searched for defects that
- * Assimp 5.2 hides: files that end early, coordinates that are no finite numbers. It drops or repeats faces,
- * or replaces numbers, and reports a mesh that is not the one in the file. Then comes its scene: arrays,
- * polygons cut into triangles, skins at rest, places. */
+/* Reads STL, Collada and FBX through Assimp. First searches the file's bytes for defects that Assimp 5.2
+ * hides: it drops or repeats faces of files that end early, and replaces numbers that are not finite. Then
+ * converts its scene: arrays, polygons, skins at rest, places. */
 #define _GNU_SOURCE
 #include "base/bytes.h"
+#include "base/decimal.h"
 #include "base/file.h"
 #include "base/memory.h"
 #include "base/vec.h"
@@ -21,16 +21,27 @@
 #include <string.h>
 #include <strings.h>
 
+typedef struct assimp {
+    const char *path;
+    const vsh_run *run;
+    vshi_job *job;
+    size_t faces; /* least number of polygons with three corners or more; 0: not known */
+    double unit;  /* metres in a unit of a Collada file, which Assimp multiplies by; 0: another format */
+    const struct aiScene *scene;
+    double root[12]; /* the transform above the scene's root */
+    bool *skinned;   /* [mNumMeshes]: whether bones have moved the mesh */
+} assimp;
+
 _Static_assert(sizeof(struct aiVector3D) == sizeof(float[3]), "Assimp's vectors are three floats");
 
 /* --- the file's bytes */
 
-/* STL: binary files are as long as their number of triangles says, ASCII ones end in "endsolid" and hold
- * numbers. Assimp 5.2 reads an ASCII file that ends between two facets as a smaller mesh. */
+/* STL: the number of triangles gives the size of a binary file. An ASCII file ends in "endsolid" and holds
+ * numbers; Assimp 5.2 reads one that ends between two facets as a smaller mesh. */
 
 enum { HEADER = 84, FACET = 50 };
 
-static vsh_result scan_ascii(vshi_assimp *scan, vshi_text *text, vsh_error *error) {
+static vsh_result scan_ascii(assimp *scan, vshi_text *text, vsh_error *error) {
     const char *at = text->bytes, *end = text->bytes + text->size;
     size_t vertices = 0;
     bool ended = false;
@@ -41,7 +52,7 @@ static vsh_result scan_ascii(vshi_assimp *scan, vshi_text *text, vsh_error *erro
         }
         if (vshi_token_is(token, "solid") || vshi_token_is(token, "endsolid")) {
             ended = token.text[0] == 'e';
-            const char *stop = memchr(at, '\n', (size_t)(end - at)); /* a name may follow, of any words */
+            const char *stop = memchr(at, '\n', (size_t)(end - at)); /* a name of any words may follow */
             at = stop != NULL ? stop : end;
         } else if (vshi_token_is(token, "endfacet")) {
             ++scan->faces;
@@ -65,7 +76,7 @@ static vsh_result scan_ascii(vshi_assimp *scan, vshi_text *text, vsh_error *erro
     return VSH_OK;
 }
 
-static vsh_result scan_stl(vshi_assimp *scan, vshi_text *text, vsh_error *error) {
+static vsh_result scan_stl(assimp *scan, vshi_text *text, vsh_error *error) {
     const size_t facets = text->size >= HEADER ? (size_t)vshi_bytes_number(text->bytes + 80, 4, false) : 0;
     const uint64_t expected = HEADER + FACET * (uint64_t)facets;
     const char *at = text->bytes;
@@ -85,64 +96,65 @@ static vsh_result scan_stl(vshi_assimp *scan, vshi_text *text, vsh_error *error)
     return VSH_OK;
 }
 
-/* Collada: the unit that its asset names ("<unit meter="0.01"/>"), by which Assimp multiplies and of which it
- * tells nothing. */
+/* Collada: the unit of the asset ("<unit meter="0.01"/>"). Assimp multiplies by it, and does not tell it. */
 
-static double read_metres(const char *tag, const char *end) {
+/* Reads meter="NUMBER" between `at` and `end`; 0: it is absent or no number. XML allows blanks around "=". */
+static double read_metres(const char *at, const char *end) {
     static const char name[] = "meter";
-    const char *at = memmem(tag, (size_t)(end - tag), name, sizeof name - 1);
-    at = at != NULL ? vshi_scan_rest(at + sizeof name - 1, end).text : end; /* XML allows blanks around "=" */
+    double metres = 0.0;
+    at = memmem(at, (size_t)(end - at), name, sizeof name - 1);
+    at = at != NULL ? vshi_scan_rest(at + sizeof name - 1, end).text : end;
     at = at < end && *at == '=' ? vshi_scan_rest(at + 1, end).text : end;
-    if (at == end || (*at != '"' && *at != '\'')) {
-        return 0.0;
-    }
-    char text[64];
-    const char *stop = memchr(at + 1, *at, (size_t)(end - at - 1));
-    const size_t size = stop != NULL ? (size_t)(stop - at - 1) : sizeof text;
-    if (size >= sizeof text || vshi_token_number((vshi_token){at + 1, size}) != VSHI_NUMBER_FINITE) {
-        return 0.0;
-    }
-    memcpy(text, at + 1, size);
-    text[size] = '\0';
-    return strtod(text, NULL);
+    const bool quoted = at < end && (*at == '"' || *at == '\'');
+    const char *stop = quoted ? memchr(at + 1, *at, (size_t)(end - at - 1)) : NULL;
+    return stop != NULL && vshi_decimal_read(at + 1, stop, &metres) ? metres : 0.0;
 }
 
-static vsh_result scan_dae(vshi_assimp *scan, const vshi_text *text) {
+static void scan_dae(assimp *scan, const vshi_text *text) {
     static const char open[] = "<unit";
     const char *end = text->bytes + text->size;
     const char *tag = memmem(text->bytes, text->size, open, sizeof open - 1);
     const char *stop = tag != NULL ? memchr(tag, '>', (size_t)(end - tag)) : NULL;
     const double metres = stop != NULL ? read_metres(tag, stop) : 1.0;
-    scan->unit = metres > 0.0 && metres < 1e12 ? metres : 1.0; /* the format's own: a metre */
-    return VSH_OK;
+    scan->unit = metres > 0.0 && metres < 1e12 ? metres : 1.0; /* the default of Collada */
 }
 
-vsh_result vshi_assimp_look(vshi_assimp *scan, vshi_text *text, vsh_error *error) {
+/* Searches the file's bytes. Errors: VSH_ERROR_READ (it ends early), VSH_ERROR_INPUT, VSH_ERROR_CANCELLED. */
+static vsh_result scan_file(assimp *scan, size_t units, vsh_error *error) {
     const char *ending = vshi_path_ending(scan->path);
-    return strcasecmp(ending, "stl") == 0   ? scan_stl(scan, text, error)
-           : strcasecmp(ending, "dae") == 0 ? scan_dae(scan, text)
-                                            : VSH_OK;
+    vshi_budget budget = {scan->path, scan->run, 0.0};
+    vshi_text text;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_text_read_whole(&text, &budget, scan->job, units, error));
+    if (strcasecmp(ending, "stl") == 0) {
+        VSHI_TRY_DONE(scan_stl(scan, &text, error));
+    } else if (strcasecmp(ending, "dae") == 0) {
+        scan_dae(scan, &text);
+    }
+    result = vshi_text_poll(&text, text.bytes + text.size, error);
+done:
+    vshi_text_free(&text);
+    return result;
 }
 
 /* --- its scene */
 
-enum { DEEPEST = 1024 /* nodes under each other */ };
+enum { DEEPEST = 1024 /* levels of nodes */ };
 
-/* Assimp stores rows one after the other. */
-static void rows_of(const struct aiMatrix4x4 *m, double rows[12]) {
+static void copy_rows(const struct aiMatrix4x4 *m, double rows[12]) {
     const double own[12] = {m->a1, m->a2, m->a3, m->a4, m->b1, m->b2,
                             m->b3, m->b4, m->c1, m->c2, m->c3, m->c4};
     memcpy(rows, own, sizeof own);
 }
 
-/* parent × the node's own transform. */
+/* world = parent × the node's own transform. */
 static void find_node_world(const double parent[12], const struct aiNode *node, double world[12]) {
     double own[12];
-    rows_of(&node->mTransformation, own);
+    copy_rows(&node->mTransformation, own);
     vshi_model_compose(parent, own, world);
 }
 
-/* Finds the first node of a name at or below `node`, and where it stands. */
+/* Finds the world transform of the first node with a name, at or below `node`. */
 static bool find_node(const struct aiNode *node, const char *name, const double parent[12], int depth,
                       double world[12]) {
     double own[12];
@@ -159,14 +171,14 @@ static bool find_node(const struct aiNode *node, const char *name, const double 
     return false;
 }
 
-static vsh_result add_bone(const vshi_assimp *source, const struct aiBone *bone, size_t vertex_count,
+static vsh_result add_bone(const assimp *source, const struct aiBone *bone, size_t vertex_count,
                            vshi_model_blend *blends, vsh_error *error) {
     const char *path = source->path;
     double world[12], offset[12], moved[12];
     if (!find_node(source->scene->mRootNode, bone->mName.data, source->root, 0, world)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s' is no node", path, bone->mName.data);
     }
-    rows_of(&bone->mOffsetMatrix, offset);
+    copy_rows(&bone->mOffsetMatrix, offset);
     vshi_model_compose(world, offset, moved);
     for (unsigned i = 0; i < bone->mNumWeights; ++i) {
         const struct aiVertexWeight given = bone->mWeights[i];
@@ -179,7 +191,7 @@ static vsh_result add_bone(const vshi_assimp *source, const struct aiBone *bone,
     return VSH_OK;
 }
 
-static vsh_result check_moved(const vshi_assimp *source, const vshi_model_shape *shape, vsh_error *error) {
+static vsh_result check_moved(const assimp *source, const vshi_model_shape *shape, vsh_error *error) {
     for (size_t v = 0; v < shape->vertex_count; ++v) {
         if (!vshi_finite(vshi_vec_off(shape->positions + 3 * v))) {
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
@@ -190,10 +202,10 @@ static vsh_result check_moved(const vshi_assimp *source, const vshi_model_shape 
 }
 
 /* Moves the vertices of mesh `mesh` into the world: Σ weight × bone's node × offset matrix; vertices without
- * a bone stay under `world`. Does so once, whatever nodes use the mesh. Errors: VSH_ERROR_INPUT (a bone
+ * a bone by `world`. Does so once, even if several nodes use the mesh. Errors: VSH_ERROR_INPUT (a bone
  * without a node, a vertex out of range, a weight that is not finite), VSH_ERROR_MEMORY. */
-static vsh_result apply_skin(vshi_assimp *source, size_t mesh, vshi_model_shape *shape,
-                             const double world[12], vsh_error *error) {
+static vsh_result apply_skin(assimp *source, size_t mesh, vshi_model_shape *shape, const double world[12],
+                             vsh_error *error) {
     const struct aiMesh *given = source->scene->mMeshes[mesh];
     if (source->skinned[mesh]) {
         return VSH_OK;
@@ -201,7 +213,7 @@ static vsh_result apply_skin(vshi_assimp *source, size_t mesh, vshi_model_shape 
     source->skinned[mesh] = true;
     vshi_model_blend *blends;
     vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&blends, shape->vertex_count, sizeof *blends, source->path, error));
+    VSHI_TRY(VSHI_ALLOCATE(blends, shape->vertex_count, source->path, error));
     for (unsigned i = 0; i < given->mNumBones; ++i) {
         VSHI_TRY_DONE(add_bone(source, given->mBones[i], shape->vertex_count, blends, error));
     }
@@ -212,7 +224,7 @@ done:
     return result;
 }
 
-/* Most triangles that a mesh's faces make. */
+/* Counts the triangles that a mesh's faces make at most. */
 static size_t count_triangles(const struct aiMesh *mesh) {
     size_t count = 0;
     for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
@@ -222,25 +234,25 @@ static size_t count_triangles(const struct aiMesh *mesh) {
     return count;
 }
 
-static vsh_result check_size(const vshi_assimp *source, vsh_error *error) {
+static vsh_result check_size(const assimp *source, vsh_error *error) {
     double bytes = 0.0;
     for (unsigned m = 0; m < source->scene->mNumMeshes; ++m) {
         const struct aiMesh *mesh = source->scene->mMeshes[m];
-        double vertex = 0.0; /* our bytes and Assimp's */
+        double vertex = 0.0; /* bytes of ours and of Assimp */
         vertex += sizeof(float[3]) + sizeof(struct aiVector3D);
         vertex += mesh->mNormals != NULL ? sizeof(float[3]) + sizeof(struct aiVector3D) : 0;
         for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
             vertex += mesh->mTextureCoords[set] != NULL ? sizeof(float[2]) + sizeof(struct aiVector3D) : 0;
         }
         vertex += mesh->mNumBones > 0 ? sizeof(vshi_model_blend) : 0;
-        /* Each of Assimp's faces has an array of its own, of 32 bytes with malloc's header. */
+        /* each of Assimp's faces has an array, of 32 bytes with malloc's header */
         bytes += vertex * mesh->mNumVertices + (sizeof(struct aiFace) + 32.0) * mesh->mNumFaces +
                  (double)sizeof(uint32_t[3]) * (double)count_triangles(mesh);
     }
     return vshi_check_limit(source->run, bytes, source->path, error);
 }
 
-static vsh_result copy_faces(const vshi_assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
+static vsh_result copy_faces(const assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
                              vsh_error *error) {
     vshi_face_cutter cutter = {
         .positions = shape->positions, .job = source->job, .turns = shape->triangle_count > mesh->mNumFaces};
@@ -257,9 +269,9 @@ static vsh_result copy_faces(const vshi_assimp *source, const struct aiMesh *mes
     return result;
 }
 
-static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
+static vsh_result copy_shape(const assimp *source, const struct aiMesh *mesh, vshi_model_shape *shape,
                              vsh_error *error) {
-    const char *what = source->path;
+    const char *path = source->path;
     const size_t count = mesh->mNumVertices;
     shape->vertex_count = count;
     shape->triangle_count = count_triangles(mesh);
@@ -271,45 +283,39 @@ static vsh_result copy_shape(const vshi_assimp *source, const struct aiMesh *mes
         shape->alpha = opacity < 1.0F ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE;
         shape->material = (int32_t)mesh->mMaterialIndex + 1;
     }
-    VSHI_TRY(vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), what, error));
+    VSHI_TRY(vshi_allocate((void **)&shape->positions, count, sizeof(float[3]), path, error));
     VSHI_TRY(
-        vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), what, error));
-    /* STL's normals are those of its facets, often zero or wrong: the triangles know better */
-    if (mesh->mNormals != NULL && strcasecmp(vshi_path_ending(source->path), "stl") != 0) {
-        VSHI_TRY(vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), what, error));
-    }
-    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-        if (mesh->mTextureCoords[set] != NULL) {
-            shape->uv_sets = set + 1;
-            VSHI_TRY(vshi_allocate((void **)&shape->uvs[set], count, sizeof(float[2]), what, error));
-        }
-    }
+        vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), path, error));
     memcpy(shape->positions, mesh->mVertices, count * sizeof(float[3]));
-    for (int set = 0; set < shape->uv_sets; ++set) {
+    for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
         const struct aiVector3D *uv = mesh->mTextureCoords[set];
-        for (size_t v = 0; v < count && uv != NULL; ++v) {
+        if (uv == NULL) {
+            continue;
+        }
+        shape->uv_sets = set + 1;
+        VSHI_TRY(vshi_allocate((void **)&shape->uvs[set], count, sizeof(float[2]), path, error));
+        for (size_t v = 0; v < count; ++v) {
             memcpy(shape->uvs[set] + 2 * v, &uv[v], sizeof(float[2]));
         }
     }
-    if (shape->normals != NULL) {
+    /* STL's normals are often zero or wrong; the triangles give better ones */
+    if (mesh->mNormals != NULL && strcasecmp(vshi_path_ending(path), "stl") != 0) {
         char where[MAXLEN + 16];
         snprintf(where, sizeof where, "mesh '%s'", mesh->mName.data);
+        VSHI_TRY(vshi_allocate((void **)&shape->normals, count, sizeof(float[3]), path, error));
         memcpy(shape->normals, mesh->mNormals, count * sizeof(float[3]));
-        vshi_model_check_normals(what, source->run, where, shape);
+        vshi_model_check_normals(path, source->run, where, shape);
     }
     return copy_faces(source, mesh, shape, error);
 }
 
-static vsh_result add_nodes(vshi_assimp *source, vsh_model *model, const struct aiNode *node,
+static vsh_result add_nodes(assimp *source, vsh_model *model, const struct aiNode *node,
                             const double parent[12], int depth, vsh_error *error) {
-    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     if (depth > DEEPEST) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its nodes are nested deeper than %d", source->path,
                          DEEPEST);
     }
-    if (vshi_job_cancelled(source->job)) {
-        return vshi_job_fail_cancelled(source->job, error);
-    }
+    VSHI_TRY(vshi_job_check(source->job, error));
     double world[12];
     find_node_world(parent, node, world);
     const uint32_t object = vshi_model_next_object(model);
@@ -327,7 +333,7 @@ static vsh_result add_nodes(vshi_assimp *source, vsh_model *model, const struct 
                                         .mesh = mesh->mName.data,
                                         .object = object,
                                         .shape = shape,
-                                        .world = skinned ? identity : world};
+                                        .world = skinned ? vshi_identity : world};
         VSHI_TRY(vshi_model_add(model, source->path, source->run, &place, error));
     }
     for (unsigned i = 0; i < node->mNumChildren; ++i) {
@@ -336,14 +342,14 @@ static vsh_result add_nodes(vshi_assimp *source, vsh_model *model, const struct 
     return VSH_OK;
 }
 
-/* Their names; what is blended is known of each mesh. */
-static vsh_result copy_materials(const vshi_assimp *source, vsh_model *model, vsh_error *error) {
+/* Copies the materials' names. Whether they are blended is known of each mesh. */
+static vsh_result copy_materials(const assimp *source, vsh_model *model, vsh_error *error) {
     const struct aiScene *scene = source->scene;
-    VSHI_TRY(vshi_model_take_plain_materials(model, scene->mNumMaterials, error));
+    VSHI_TRY(vshi_model_add_materials(model, scene->mNumMaterials, error));
     for (size_t m = 0; m < model->shape_count; ++m) {
         const int32_t material = model->shapes[m].material;
         if (material > 0) {
-            model->materials[material - 1].told.alpha = model->shapes[m].alpha;
+            model->materials[material - 1].values.alpha = model->shapes[m].alpha;
         }
     }
     for (unsigned i = 0; i < scene->mNumMaterials; ++i) {
@@ -355,77 +361,62 @@ static vsh_result copy_materials(const vshi_assimp *source, vsh_model *model, vs
     return VSH_OK;
 }
 
-static vsh_result check_mesh(const char *path, const struct aiMesh *mesh, unsigned place, vsh_error *error) {
+/* Checks a mesh's numbers, and counts its polygons. */
+static vsh_result check_mesh(const char *path, const struct aiMesh *mesh, unsigned number, size_t *polygons,
+                             vsh_error *error) {
     char where[MAXLEN + 32];
-    snprintf(where, sizeof where, "mesh %u '%s'", place, mesh->mName.data);
+    snprintf(where, sizeof where, "mesh %u '%s'", number, mesh->mName.data);
     VSHI_TRY(
         vshi_model_check_positions(path, where, (const float *)mesh->mVertices, mesh->mNumVertices, error));
     for (unsigned f = 0; f < mesh->mNumFaces; ++f) {
         const struct aiFace *face = &mesh->mFaces[f];
+        *polygons += face->mNumIndices >= 3;
         for (unsigned k = 0; k < face->mNumIndices; ++k) {
             if (face->mIndices[k] >= mesh->mNumVertices) {
                 return vshi_fail(error, VSH_ERROR_INPUT,
-                                 "%s: mesh %u '%s': face %u uses vertex %u, but there are only %u", path,
-                                 place, mesh->mName.data, f, face->mIndices[k], mesh->mNumVertices);
+                                 "%s: %s: face %u uses vertex %u, but there are only %u", path, where, f,
+                                 face->mIndices[k], mesh->mNumVertices);
             }
         }
     }
     return VSH_OK;
 }
 
-/* Everything that what follows takes for granted, and that nothing was lost on the way here. */
-static vsh_result check_scene(const char *path, const struct aiScene *scene, size_t expected, vshi_job *job,
-                              vsh_error *error) {
-    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-        if (vshi_job_cancelled(job)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
-        VSHI_TRY(check_mesh(path, scene->mMeshes[m], m, error));
+/* Checks the scene's numbers, and that Assimp lost no faces. */
+static vsh_result check_scene(const assimp *source, vsh_error *error) {
+    const char *path = source->path;
+    size_t polygons = 0;
+    for (unsigned m = 0; m < source->scene->mNumMeshes; ++m) {
+        VSHI_TRY(vshi_job_check(source->job, error));
+        VSHI_TRY(check_mesh(path, source->scene->mMeshes[m], m, &polygons, error));
     }
-    size_t faces = 0;
-    for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
-        for (unsigned f = 0; f < scene->mMeshes[m]->mNumFaces; ++f) {
-            faces += scene->mMeshes[m]->mFaces[f].mNumIndices >= 3;
-        }
-    }
-    if (faces < expected) {
+    if (polygons < source->faces) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: only %zu of its %zu faces can be read: the others use vertices out of range",
-                         path, faces, expected);
-    }
-    if (faces == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", path);
+                         path, polygons, source->faces);
     }
     return VSH_OK;
 }
 
-static vsh_result build(vshi_assimp *source, double unit, vsh_model **out, vsh_error *error) {
+static vsh_result build(assimp *source, double unit, vsh_model **out, vsh_error *error) {
     vsh_model *model = NULL;
     const struct aiScene *scene = source->scene;
-    const double metres = source->unit > 0.0 || !(unit > 0.0) ? 1.0 : unit; /* Assimp has done it */
+    const double metres = source->unit > 0.0 || !(unit > 0.0) ? 1.0 : unit; /* Assimp has scaled Collada */
     vsh_result result;
     VSHI_TRY(check_size(source, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&model, 1, sizeof *model, source->path, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&model->shapes, scene->mNumMeshes, sizeof *model->shapes,
-                                source->path, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(model, 1, source->path, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(model->shapes, scene->mNumMeshes, source->path, error));
     model->shape_count = scene->mNumMeshes;
-    VSHI_TRY_DONE(vshi_allocate((void **)&source->skinned, scene->mNumMeshes, sizeof *source->skinned,
-                                source->path, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(source->skinned, scene->mNumMeshes, source->path, error));
     model->unit = source->unit > 0.0 ? source->unit : unit;
     for (size_t m = 0; m < model->shape_count; ++m) {
-        VSHI_TRY_DONE(vshi_job_cancelled(source->job)
-                          ? vshi_job_fail_cancelled(source->job, error)
-                          : copy_shape(source, scene->mMeshes[m], &model->shapes[m], error));
+        VSHI_TRY_DONE(vshi_job_check(source->job, error));
+        VSHI_TRY_DONE(copy_shape(source, scene->mMeshes[m], &model->shapes[m], error));
     }
     VSHI_TRY_DONE(copy_materials(source, model, error));
     if (scene->mRootNode != NULL) {
         source->root[0] = source->root[5] = source->root[10] = metres;
         VSHI_TRY_DONE(add_nodes(source, model, scene->mRootNode, source->root, 0, error));
-    }
-    if (model->entry_count == 0) {
-        result = vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles: no node uses its meshes",
-                           source->path);
-        goto done;
     }
     *out = model;
     model = NULL;
@@ -435,15 +426,18 @@ done:
     return result;
 }
 
-vsh_result vshi_assimp_read(vshi_assimp *source, size_t units, vsh_model **model, vsh_error *error) {
+vsh_result vshi_assimp_read(const char *path, const vsh_run *run, vshi_job *job, size_t units,
+                            vsh_model **model, vsh_error *error) {
+    const size_t scan_units = units / 5;
+    assimp source = {.path = path, .run = run, .job = job};
     vshi_import *import = NULL;
     vsh_result result;
+    VSHI_TRY(scan_file(&source, scan_units, error));
     VSHI_TRY(vshi_importers_load(error));
-    VSHI_TRY(vshi_importers()->read(source->path, source->run->allow_outside != 0, source->job, units,
-                                    &import, error));
-    source->scene = import->scene;
-    VSHI_TRY_DONE(check_scene(source->path, source->scene, source->faces, source->job, error));
-    VSHI_TRY_DONE(build(source, import->unit, model, error));
+    VSHI_TRY(vshi_importers()->read(path, run->allow_outside != 0, job, units - scan_units, &import, error));
+    source.scene = import->scene;
+    VSHI_TRY_DONE(check_scene(&source, error));
+    result = build(&source, import->unit, model, error);
 done:
     vshi_importers()->free(import);
     return result;

@@ -11,22 +11,21 @@
  * floats, so products of two are exact in double. Expansions give the sign of their sum (Shewchuk, "Adaptive
  * precision floating-point arithmetic and fast robust geometric predicates", 1997).
  *
- * The polygon is projected along the axis nearest to its normal (Newell's). That keeps coordinates as they
- * are; a rotation into its plane would round them. Ears are looked for in the order of Assimp 5.2, so that
- * convex polygons become the fans that they have always become. An ear is cut where no other corner lies in
- * it or on its border; a border that is touched, and a corner that is left with no angle, are put up with
- * only where nothing else is left. Time: corners that can lie in an ear are sorted along the polygon's longer
- * side. */
+ * Projects the polygon along the axis nearest to its normal (Newell's). That keeps its coordinates; a
+ * rotation into its plane would round them. Searches ears in the order of Assimp 5.2, so that convex polygons
+ * become the same fans as before. Cuts an ear if no other corner lies in it or on its border. Accepts corners
+ * on the border, and corners without an angle, only if there is no better ear. For speed, corners that can
+ * lie in an ear are sorted along the polygon's longer side. */
 
 typedef struct vshi_polygon_corner {
-    float x, y; /* in the plane that is looked at */
+    float x, y; /* in the plane of projection */
     uint32_t next, previous;
     bool gone;
 } corner;
 
 /* --- exact orientation */
 
-/* Adds b to an expansion of n components that do not overlap, smallest first, which then has n + 1. */
+/* Adds b to an expansion of n components, which do not overlap, smallest first. It then has n + 1. */
 static void grow_expansion(double *e, int n, double b) {
     double q = b;
     for (int i = 0; i < n; ++i) {
@@ -44,7 +43,7 @@ static double orient(const corner *a, const corner *b, const corner *c) {
     const double cx = (double)c->x, cy = (double)c->y;
     const double left = (ax - cx) * (by - cy), right = (ay - cy) * (bx - cx);
     const double rough = left - right;
-    /* Each difference is off by 2^-53 of itself, the products and their difference likewise. */
+    /* Each difference has a relative error of 2^-53, like the products and their difference. */
     static const double margin = 8.0 / 9007199254740992.0;
     if (fabs(rough) > margin * (fabs(left) + fabs(right))) {
         return rough;
@@ -74,7 +73,7 @@ typedef struct cut {
     size_t left;  /* corners not yet cut */
     bool along_y; /* reflex corners are sorted by y, else by x */
     vshi_job *job;
-    size_t looked; /* ears tried */
+    size_t tried; /* ears */
     const uint32_t *vertices;
     uint32_t *triangles; /* three numbers of corners each */
     size_t made;
@@ -97,8 +96,8 @@ static void newell(const float *positions, const uint32_t *vertices, size_t coun
     }
 }
 
-/* Lays the corners into a plane in which the polygon goes round to the left. False: it has no area. */
-static bool lay_out(cut *p, const float *positions) {
+/* Projects the corners so that the polygon turns left. Returns false if it has no area. */
+static bool project(cut *p, const float *positions) {
     double normal[3];
     newell(positions, p->vertices, p->count, normal);
     int axis = fabs(normal[1]) > fabs(normal[0]) ? 1 : 0;
@@ -132,7 +131,7 @@ static int compare_keys(const void *a, const void *b, void *user) {
     return one < other ? -1 : one > other;
 }
 
-/* Corners that are not convex: only they can be the nearest in an ear's way. Cutting makes none. */
+/* Finds corners that are not convex. If any corner lies in an ear, one of them does. Cutting adds none. */
 static void find_reflex(cut *p) {
     p->reflex_count = 0;
     for (uint32_t i = 0; i < p->count; ++i) {
@@ -143,11 +142,11 @@ static void find_reflex(cut *p) {
     qsort_r(p->reflex, p->reflex_count, sizeof *p->reflex, compare_keys, p);
 }
 
-/* Demands on an ear, from the strictest on. */
+/* Demands on an ear, strictest first. */
 enum { CLEAN, FOLDING, TOUCHED, FLAT, ANY_CONVEX, ANY, DEMANDS };
 
-/* Whether a corner lies in the triangle, or (closed) on its border; at one of its corners does not count. */
-static bool in_way(const cut *p, const corner *a, const corner *b, const corner *c, bool closed) {
+/* Whether a corner lies in the triangle, or (closed) on its border, but not at its corners. */
+static bool is_occupied(const cut *p, const corner *a, const corner *b, const corner *c, bool closed) {
     const float least = p->along_y ? fminf(a->y, fminf(b->y, c->y)) : fminf(a->x, fminf(b->x, c->x));
     const float most = p->along_y ? fmaxf(a->y, fmaxf(b->y, c->y)) : fmaxf(a->x, fmaxf(b->x, c->x));
     size_t low = 0, high = p->reflex_count;
@@ -185,7 +184,7 @@ static bool folds(const corner *a, const corner *b, const corner *c) {
 static bool is_ear(cut *p, uint32_t ear, int demand) {
     const corner *b = &p->c[ear], *a = &p->c[b->previous], *c = &p->c[b->next];
     const double turn = orient(a, b, c);
-    ++p->looked;
+    ++p->tried;
     if (demand == ANY) {
         return true;
     }
@@ -198,7 +197,7 @@ static bool is_ear(cut *p, uint32_t ear, int demand) {
     if (demand == CLEAN && p->left > 3 && (folds(&p->c[a->previous], a, c) || folds(a, c, &p->c[c->next]))) {
         return false;
     }
-    return demand == ANY_CONVEX || !in_way(p, a, b, c, demand != TOUCHED);
+    return demand == ANY_CONVEX || !is_occupied(p, a, b, c, demand != TOUCHED);
 }
 
 static void emit(cut *p, uint32_t a, uint32_t b, uint32_t c) {
@@ -220,7 +219,7 @@ static void cut_ear(cut *p, uint32_t ear, int demand) {
     --p->left;
 }
 
-/* The three corners that are left, in their first order. */
+/* Cuts the last three corners, in their first order. */
 static void cut_last(cut *p) {
     uint32_t rest[3];
     size_t found = 0;
@@ -237,8 +236,8 @@ static void cut_last(cut *p) {
 }
 
 static vsh_result cut_ears(cut *p, vsh_error *error) {
-    enum { LOOKS_A_POLL = 8192 };
-    size_t next_poll = LOOKS_A_POLL;
+    enum { EARS_A_POLL = 8192 };
+    size_t next_poll = EARS_A_POLL;
     uint32_t ear = 0;
     p->left = p->count;
     while (p->left > 3) {
@@ -248,11 +247,9 @@ static vsh_result cut_ears(cut *p, vsh_error *error) {
                 passed = 0;
                 ++demand;
             }
-            if (p->looked >= next_poll) {
-                next_poll = p->looked + LOOKS_A_POLL;
-                if (vshi_job_cancelled(p->job)) {
-                    return vshi_job_fail_cancelled(p->job, error);
-                }
+            if (p->tried >= next_poll) {
+                next_poll = p->tried + EARS_A_POLL;
+                VSHI_TRY(vshi_job_check(p->job, error));
             }
         }
         const uint32_t next = p->c[ear].next;
@@ -263,8 +260,8 @@ static vsh_result cut_ears(cut *p, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Four corners: by the diagonal from the first, or from the one that is not convex, where that gives two
- * triangles. */
+/* Cuts a quad along the diagonal from the first corner, or from one that is not convex. Returns false if that
+ * gives no two triangles. */
 static bool cut_quad(cut *p) {
     const corner *c = p->c;
     uint32_t start = 0;
@@ -299,8 +296,8 @@ static vsh_result reserve(vshi_face_cutter *cutter, size_t count, vsh_error *err
     cutter->reflex = NULL;
     cutter->capacity = 0;
     const size_t capacity = count + count / 2;
-    VSHI_TRY(vshi_allocate((void **)&cutter->corners, capacity, sizeof *cutter->corners, "polygon", error));
-    VSHI_TRY(vshi_allocate((void **)&cutter->reflex, capacity, sizeof *cutter->reflex, "polygon", error));
+    VSHI_TRY(VSHI_ALLOCATE(cutter->corners, capacity, "polygon", error));
+    VSHI_TRY(VSHI_ALLOCATE(cutter->reflex, capacity, "polygon", error));
     cutter->capacity = capacity;
     return VSH_OK;
 }
@@ -318,7 +315,7 @@ static vsh_result cut_polygon(vshi_face_cutter *cutter, const uint32_t *vertices
     vsh_result result = VSH_OK;
     if (count == 3) {
         emit(&p, 0, 1, 2);
-    } else if (!lay_out(&p, cutter->positions)) {
+    } else if (!project(&p, cutter->positions)) {
         cut_fan(&p, cutter->positions);
     } else if (count != 4 || !cut_quad(&p)) {
         find_reflex(&p);
@@ -329,8 +326,8 @@ static vsh_result cut_polygon(vshi_face_cutter *cutter, const uint32_t *vertices
     return result;
 }
 
-/* Polygons that shared their first corner with the face before have always begun at another one (Assimp's
- * encoding of polygons as fans), and so bakes keep their bits. */
+/* Turns triangles whose first corner is that of the triangle before. Assimp did so, because it encodes
+ * polygons as fans; bakes keep their bits. */
 static void turn_fan(vshi_face_cutter *cutter, uint32_t *triangles, size_t count) {
     if (cutter->begun && triangles[0] == cutter->last_first) {
         uint32_t *t = triangles;
@@ -359,8 +356,8 @@ vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size
     if (count < 3) {
         return VSH_OK;
     }
-    if (cutter->looked++ % FACES_A_POLL == 0 && vshi_job_cancelled(cutter->job)) {
-        return vshi_job_fail_cancelled(cutter->job, error);
+    if (cutter->faces++ % FACES_A_POLL == 0) {
+        VSHI_TRY(vshi_job_check(cutter->job, error));
     }
     VSHI_TRY(cut_polygon(cutter, corners, count, triangles, made, error));
     if (apart) {
@@ -391,7 +388,7 @@ void vshi_face_cutter_end(vshi_face_cutter *cutter, const vsh_run *run, const ch
     }
 }
 
-size_t vshi_faces_most(const vshi_face_run *runs, size_t count, bool *triangles) {
+size_t vshi_faces_count_triangles(const vshi_face_run *runs, size_t count, bool *triangles) {
     size_t most = 0;
     *triangles = true;
     for (size_t i = 0; i < count; ++i) {
@@ -409,7 +406,7 @@ vsh_result vshi_faces_cut(vshi_face_cutter *cutter, const vshi_face_run *runs, s
     for (size_t i = 0; i < count; ++i) {
         faces += runs[i].faces;
     }
-    cutter->turns = !cutter->apart && vshi_faces_most(runs, count, &plain) > faces;
+    cutter->turns = !cutter->apart && vshi_faces_count_triangles(runs, count, &plain) > faces;
     for (size_t i = 0; i < count; ++i) {
         for (size_t f = 0; f < runs[i].faces; ++f, corners += runs[i].size) {
             size_t more;

@@ -5,27 +5,26 @@
 #include "base/job.h"
 #include "model/text.h"
 
-/* Cuts one face after the other. Begin with positions (finite) and job, and all else 0. */
+/* Cuts one face after the other. Begins with positions (finite) and job; all else is 0. */
 typedef struct vshi_face_cutter {
     const float *positions;
     vshi_job *job;
-    bool apart; /* corners at one vertex count as two, as if each had its own */
-    bool turns; /* whether polygons of four corners are turned as larger ones */
+    bool apart; /* treats corners at one vertex as two vertices */
+    bool turns; /* whether quads are turned like larger polygons */
     bool begun;
     uint32_t last_first;
-    size_t looked;
+    size_t faces;    /* so far */
     size_t crossing; /* out: polygons whose edges cross */
-    size_t capacity; /* memory that polygons share one after the other */
+    size_t capacity; /* of the arrays below, which polygons share */
     struct vshi_polygon_corner *corners;
-    uint32_t *reflex; /* corners that others must stay clear of, along `axis` */
+    uint32_t *reflex; /* corners that may lie in ears, sorted */
 } vshi_face_cutter;
 
-/* Cuts the face of `count` corners, vertices of the positions, into triangles with its own winding, at most
- * count - 2: *made of them, three vertices each, in `triangles`. The corners should lie in one plane, nearly.
- * Every simple polygon is covered exactly, also one whose holes are joined to its outline by bridges, one
- * with corners on a line or twice at a place; no triangle is flipped, and none without area is made. A
- * polygon without area becomes a fan without area. Where edges cross, some triangles are made. Errors:
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* Cuts a face of `count` corners, which are vertices of the positions, into *made triangles, at most count -
+ * 2, with the same winding. The corners should nearly lie in one plane. Covers every simple polygon exactly,
+ * also with holes that bridges join to the outline, with corners on a line, or twice at a place. Makes no
+ * flipped triangles, and none without area. A polygon without area becomes a fan without area. If edges
+ * cross, it still makes triangles. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_face_cut(vshi_face_cutter *cutter, const uint32_t *corners, size_t count, uint32_t *triangles,
                          size_t *made, vsh_error *error);
 
@@ -37,7 +36,7 @@ typedef struct vshi_face_run {
     size_t faces, size;
 } vshi_face_run;
 
-/* Faces that are being read. */
+/* The faces of a file so far. */
 typedef struct vshi_faces {
     uint32_t *corners;
     size_t count, capacity;
@@ -45,10 +44,10 @@ typedef struct vshi_faces {
     size_t run_count, run_capacity;
 } vshi_faces;
 
-/* Of some of the runs: the triangles they make at most, and whether they are triangles already. */
-size_t vshi_faces_most(const vshi_face_run *runs, size_t count, bool *triangles);
+/* Counts the triangles that some runs make at most. *triangles: all their faces are triangles. */
+size_t vshi_faces_count_triangles(const vshi_face_run *runs, size_t count, bool *triangles);
 
-/* The last `size` corners are a face of a mesh that begins at run `first_run`. */
+/* Ends a face with the last `size` corners, in a mesh that begins at run `first_run`. */
 static inline vsh_result vshi_faces_end_face(vshi_faces *faces, vshi_budget *budget, size_t first_run,
                                              size_t size, vsh_error *error) {
     const size_t last = faces->run_count - 1;
@@ -56,15 +55,12 @@ static inline vsh_result vshi_faces_end_face(vshi_faces *faces, vshi_budget *bud
         ++faces->runs[last].faces;
         return VSH_OK;
     }
-    const vsh_result result = vshi_grow(budget, &faces->runs, &faces->run_capacity, faces->run_count + 1,
-                                        sizeof *faces->runs, error);
-    if (result == VSH_OK) {
-        faces->runs[faces->run_count++] = (vshi_face_run){1, size};
-    }
-    return result;
+    VSHI_TRY(VSHI_GROW(budget, faces->runs, faces->run_capacity, faces->run_count + 1, error));
+    faces->runs[faces->run_count++] = (vshi_face_run){1, size};
+    return VSH_OK;
 }
 
-/* Cuts all faces of some runs, whose corners these are. */
+/* Cuts all faces of some runs with these corners. */
 vsh_result vshi_faces_cut(vshi_face_cutter *cutter, const vshi_face_run *runs, size_t count,
                           const uint32_t *corners, uint32_t *triangles, size_t *made, vsh_error *error);
 

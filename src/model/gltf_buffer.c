@@ -1,9 +1,10 @@
-/* The bytes of a glTF: the binary chunk of a GLB, data in the JSON itself, files beside it. */
+/* The bytes of a glTF (the binary chunk of a GLB, data URIs, files), its buffer views and accessors. */
 #include "model/gltf.h"
 
+#include "base/bytes.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/uri.h"
+#include "base/text.h"
 #include "model/text.h"
 
 #include <math.h>
@@ -21,7 +22,7 @@ vsh_result vshi_gltf_read_data(vshi_gltf *gltf, const char *where, const char *u
     const bool damaged = *size == 0;
     *size = 0;
     return damaged ? vshi_gltf_fail(gltf, error, "%s: its data URI is no base64", where)
-                   : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
+                   : vshi_fail_memory(error, gltf->path);
 }
 
 vsh_result vshi_gltf_read_file(vshi_gltf *gltf, const char *path, const char *name, unsigned char **bytes,
@@ -44,7 +45,7 @@ static vsh_result load_beside(vshi_gltf *gltf, size_t index, const char *uri, vs
     char *path = vshi_uri_path(gltf->path, uri), name[1024];
     vsh_result result;
     if (path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
+        return vshi_fail_memory(error, gltf->path);
     }
     if (gltf->run->allow_outside || vshi_input_is_beside(gltf->path, path)) {
         snprintf(name, sizeof name, "%.400s: buffers[%zu], which holds its vertices, is the file '%.400s'",
@@ -61,11 +62,14 @@ static vsh_result load_beside(vshi_gltf *gltf, size_t index, const char *uri, vs
     return result;
 }
 
-static vsh_result load(vshi_gltf *gltf, size_t index, vsh_error *error) {
+vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     const json_t *given = vshi_gltf_element(gltf, "buffers", index);
     const json_t *uri = json_object_get(given, "uri");
     vshi_gltf_buffer *buffer = &gltf->buffers[index];
     size_t length;
+    if (buffer->loaded) {
+        return VSH_OK;
+    }
     if (!vshi_gltf_count(given, "byteLength", SIZE_MAX, &length) || length == SIZE_MAX) {
         return vshi_gltf_fail(gltf, error, "buffers[%zu]: has no byteLength", index);
     }
@@ -92,7 +96,7 @@ static vsh_result load(vshi_gltf *gltf, size_t index, vsh_error *error) {
     return VSH_OK;
 }
 
-/* The bytes that `buffer`, `byteOffset` and `byteLength` of an object name. */
+/* Finds the bytes at `buffer`, `byteOffset` and `byteLength` of an object. */
 static vsh_result find_part(vshi_gltf *gltf, const json_t *object, const char *where, vshi_gltf_bytes *bytes,
                             vsh_error *error) {
     size_t buffer, offset, length;
@@ -101,9 +105,7 @@ static vsh_result find_part(vshi_gltf *gltf, const json_t *object, const char *w
         !vshi_gltf_count(object, "byteLength", SIZE_MAX, &length) || length == SIZE_MAX) {
         return vshi_gltf_fail(gltf, error, "%s: its buffer, byteOffset or byteLength is wrong", where);
     }
-    if (!gltf->buffers[buffer].loaded) {
-        VSHI_TRY(load(gltf, buffer, error));
-    }
+    VSHI_TRY(vshi_gltf_load(gltf, buffer, error));
     const vshi_gltf_bytes all = gltf->buffers[buffer].bytes;
     if (offset > all.size || length > all.size - offset) {
         return vshi_gltf_fail(gltf, error, "%s: %zu bytes from %zu on pass the %zu bytes of buffers[%zu]",
@@ -113,20 +115,16 @@ static vsh_result find_part(vshi_gltf *gltf, const json_t *object, const char *w
     return VSH_OK;
 }
 
-vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
-    return gltf->buffers[index].loaded ? VSH_OK : load(gltf, index, error);
-}
-
-/* Compressed buffer views: EXT_meshopt_compression (Khronos, 2021), and KHR_meshopt_compression of the same
- * version. meshoptimizer unpacks them. Filters are ours: the library's take approximate reciprocals of roots,
- * which differ between processors. */
+/* --- compressed buffer views: EXT_meshopt_compression (Khronos, 2021), and KHR_meshopt_compression of the
+ * same version. meshoptimizer unpacks them. The filters are ours, because the library's use approximate
+ * reciprocals of roots, which differ between processors. */
 
 enum { ATTRIBUTES, TRIANGLES, INDICES, MODES };
 
-/* Data begin with a byte whose lower half is their version. */
+/* The first byte of the data has their version in its lower half. */
 static const struct {
     const char *name;
-    unsigned char header, versions; /* highest that is read */
+    unsigned char header, version; /* upper half of the first byte; highest version that is read */
 } modes[MODES] = {{"ATTRIBUTES", 0xa0, 0}, {"TRIANGLES", 0xe0, 1}, {"INDICES", 0xd0, 1}};
 
 typedef struct packed {
@@ -143,10 +141,9 @@ static float rounded_to(float value, float most) {
     return whole > most ? most : whole < -most ? -most : whole;
 }
 
-/* A direction from its place on an octahedron whose corners are `one` away; of none where that is not
- * positive.
- */
-static void unfold(const float given[3], float most, float made[3]) {
+/* Converts a place on an octahedron, whose corners are given[2] away, to a direction; zeros if that is not
+ * positive. */
+static void unfold_octahedron(const float given[3], float most, float made[3]) {
     memset(made, 0, sizeof(float[3]));
     if (!(given[2] > 0.0F)) {
         return;
@@ -170,7 +167,7 @@ static void decode_octahedral(unsigned char *at, size_t stride) {
         }
         given[k] = (float)two;
     }
-    unfold(given, stride == 4 ? 127.0F : 32767.0F, made);
+    unfold_octahedron(given, stride == 4 ? 127.0F : 32767.0F, made);
     for (int k = 0; k < 3; ++k) {
         const int16_t two = (int16_t)made[k];
         if (stride == 4) {
@@ -181,7 +178,7 @@ static void decode_octahedral(unsigned char *at, size_t stride) {
     }
 }
 
-/* Three components of a unit quaternion, and which one is left out as the largest. */
+/* The data are three components of a unit quaternion, and the index of the largest one. */
 static void decode_quaternion(unsigned char *at, size_t stride) {
     static const float range = 0.70710678118654752F, most = 32767.0F;
     int16_t given[4], made[4];
@@ -199,17 +196,14 @@ static void decode_quaternion(unsigned char *at, size_t stride) {
     memcpy(at, made, sizeof made);
 }
 
-/* Floats of 8 bits of exponent and 24 of mantissa, both signed. */
+/* The data are floats with 8 bits of exponent and 24 of mantissa, both signed. */
 static void decode_exponential(unsigned char *at, size_t stride) {
     for (size_t k = 0; k < stride; k += 4) {
         uint32_t bits;
         memcpy(&bits, at + k, sizeof bits);
         const int exponent = (int8_t)(bits >> 24);
         const int32_t mantissa = (int32_t)(bits << 8) >> 8;
-        const uint64_t scale_bits = (uint64_t)(exponent + 1023) << 52;
-        double scale;
-        memcpy(&scale, &scale_bits, sizeof scale);
-        const float value = (float)(scale * (double)mantissa);
+        const float value = (float)ldexp((double)mantissa, exponent);
         memcpy(at + k, &value, sizeof value);
     }
 }
@@ -236,10 +230,10 @@ static bool stride_holds(const packed *p) {
            p->stride <= filters[p->filter].most;
 }
 
-/* Whether so few bytes can hold so many elements: 2 bits stand for 16 bytes of attributes, a byte for a
+/* Whether the bytes can hold so many elements: at least 2 bits for 16 bytes of attributes, and a byte for a
  * triangle or an index. */
 static bool may_hold(const packed *p) {
-    enum { DENSEST = 64, TAIL = 256 * 256 /* of elements that fill no block */ };
+    enum { DENSEST = 64, TAIL = 256 * 256 /* bytes of a last, partial block */ };
     const size_t size = p->bytes.size;
     return p->mode == ATTRIBUTES ? (double)p->count * (double)p->stride <= DENSEST * (double)size + TAIL
                                  : (p->mode == TRIANGLES ? p->count / 3 : p->count) <= size;
@@ -257,8 +251,8 @@ static vsh_result read_packed(vshi_gltf *gltf, const json_t *extension, packed *
     }
     if (p->mode == MODES || p->filter == FILTERS) {
         return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
-                         "%s: %s: its compression has mode '%.40s' and filter '%.40s', which are not known",
-                         gltf->path, p->where, mode != NULL ? mode : "", filter != NULL ? filter : "NONE");
+                         "%s: %s: its compression has the unknown mode '%.40s' or filter '%.40s'", gltf->path,
+                         p->where, mode != NULL ? mode : "", filter != NULL ? filter : "NONE");
     }
     if (!vshi_gltf_count(extension, "count", 0, &p->count) || p->count == 0 || p->count > UINT32_MAX ||
         !vshi_gltf_count(extension, "byteStride", 0, &p->stride) || !stride_holds(p)) {
@@ -269,12 +263,12 @@ static vsh_result read_packed(vshi_gltf *gltf, const json_t *extension, packed *
     }
     VSHI_TRY(find_part(gltf, extension, p->where, &p->bytes, error));
     const unsigned char first = p->bytes.size > 0 ? p->bytes.at[0] : 0;
-    if ((first & 0xf0) == modes[p->mode].header && (first & 0x0f) > modes[p->mode].versions) {
+    if ((first & 0xf0) == modes[p->mode].header && (first & 0x0f) > modes[p->mode].version) {
         return vshi_fail(
             error, VSH_ERROR_UNSUPPORTED,
             "%s: %s: its compressed %s are of version %d; up to version %d is read: 'gltfpack -i "
             "IN.glb -o OUT.glb' without -c writes them as they are",
-            gltf->path, p->where, modes[p->mode].name, first & 0x0f, modes[p->mode].versions);
+            gltf->path, p->where, modes[p->mode].name, first & 0x0f, modes[p->mode].version);
     }
     return may_hold(p) ? VSH_OK
                        : vshi_gltf_fail(gltf, error,
@@ -292,20 +286,17 @@ static int decode_packed(const packed *p, unsigned char *to) {
                                   : meshopt_decodeIndexSequence(to, p->count, p->stride, from, size);
 }
 
-/* Unpacks what EXT_meshopt_compression names, into new memory. */
+/* Unpacks data of EXT_meshopt_compression into new memory. */
 static vsh_result read_meshopt(vshi_gltf *gltf, const json_t *extension, const char *where,
                                unsigned char **made, size_t *size, vsh_error *error) {
     packed p = {.where = where};
     VSHI_TRY(read_packed(gltf, extension, &p, error));
-    *size = p.count * p.stride; /* may_hold() */
+    *size = p.count * p.stride; /* may_hold() limits it */
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)made, p.count, p.stride, error));
-    if (vshi_job_cancelled(gltf->job)) {
-        return vshi_job_fail_cancelled(gltf->job, error);
-    }
+    VSHI_TRY(vshi_job_check(gltf->job, error));
     if (decode_packed(&p, *made) != 0) {
         return vshi_gltf_fail(gltf, error,
-                              "%s: its compressed %s are damaged: %zu bytes that are to hold %zu elements of "
-                              "%zu bytes",
+                              "%s: its compressed %s are damaged: %zu bytes for %zu elements of %zu bytes",
                               where, modes[p.mode].name, p.bytes.size, p.count, p.stride);
     }
     for (size_t i = 0; filters[p.filter].decode != NULL && i < p.count; ++i) {
@@ -314,7 +305,7 @@ static vsh_result read_meshopt(vshi_gltf *gltf, const json_t *extension, const c
     return VSH_OK;
 }
 
-/* What a compressed view unpacks to, once. Its own buffer may have no data. */
+/* Unpacks a compressed view, once. The view's own buffer may have no data. */
 static vsh_result unpack(vshi_gltf *gltf, size_t index, const json_t *extension, const char *where,
                          size_t length, vshi_gltf_bytes *bytes, vsh_error *error) {
     vshi_gltf_buffer *view = &gltf->views[index];
@@ -358,8 +349,8 @@ void vshi_gltf_free_buffers(vshi_gltf *gltf) {
     free(gltf->views);
 }
 
-/* Accessors: typed elements of a buffer view, with those that a sparse accessor replaces (glTF 2.0, 3.6.2),
- * and integers as the numbers that they stand for (3.11, KHR_mesh_quantization). */
+/* --- accessors: typed elements of a buffer view, some replaced by a sparse accessor (glTF 2.0, 3.6.2).
+ * Integers may be normalized (3.11, KHR_mesh_quantization). */
 
 static const struct {
     size_t size; /* bytes; 0: no type */
@@ -385,9 +376,9 @@ static int component_count(const char *type) {
     return 0;
 }
 
-/* `count` elements of `size` bytes from `offset` on in a view. */
-static vsh_result place(vshi_gltf *gltf, const char *where, size_t view, size_t offset, size_t count,
-                        size_t size, const unsigned char **at, size_t *stride, vsh_error *error) {
+/* Finds `count` elements of `size` bytes from `offset` on in a view. */
+static vsh_result find_elements(vshi_gltf *gltf, const char *where, size_t view, size_t offset, size_t count,
+                                size_t size, const unsigned char **at, size_t *stride, vsh_error *error) {
     vshi_gltf_bytes bytes;
     size_t given;
     VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &given, error));
@@ -406,28 +397,14 @@ static vsh_result place(vshi_gltf *gltf, const char *where, size_t view, size_t 
 }
 
 double vshi_gltf_component(const unsigned char *at, int type) {
-    int16_t two;
-    uint16_t pair;
-    uint32_t four;
-    float number;
-    switch (type) {
-    case VSHI_GLTF_BYTE:
-        return (double)(int8_t)*at;
-    case VSHI_GLTF_UBYTE:
-        return (double)*at;
-    case VSHI_GLTF_SHORT:
-        memcpy(&two, at, sizeof two);
-        return (double)two;
-    case VSHI_GLTF_USHORT:
-        memcpy(&pair, at, sizeof pair);
-        return (double)pair;
-    case VSHI_GLTF_UINT:
-        memcpy(&four, at, sizeof four);
-        return (double)four;
-    default:
+    if (type == VSHI_GLTF_FLOAT) {
+        float number;
         memcpy(&number, at, sizeof number);
         return (double)number;
     }
+    const bool is_signed = type == VSHI_GLTF_BYTE || type == VSHI_GLTF_SHORT;
+    return (double)vshi_bytes_integer((const char *)at, (int)vshi_gltf_component_size(type), is_signed,
+                                      false);
 }
 
 static bool is_unsigned(size_t type) {
@@ -454,10 +431,10 @@ static vsh_result open_sparse(vshi_gltf *gltf, const json_t *sparse, const char 
     }
     const size_t index_size = vshi_gltf_component_size((int)type);
     const size_t value_size = (size_t)accessor->components * vshi_gltf_component_size(accessor->type);
-    VSHI_TRY(place(gltf, where, index_view, index_offset, count, index_size, &accessor->sparse_at, &stride,
-                   error));
-    VSHI_TRY(place(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
-                   &stride, error));
+    VSHI_TRY(find_elements(gltf, where, index_view, index_offset, count, index_size, &accessor->sparse_at,
+                           &stride, error));
+    VSHI_TRY(find_elements(gltf, where, value_view, value_offset, count, value_size, &accessor->sparse_values,
+                           &stride, error));
     for (size_t i = 0; i < count; ++i) {
         const size_t index = (size_t)vshi_gltf_component(accessor->sparse_at + i * index_size, (int)type);
         if (index >= accessor->count) {
@@ -490,8 +467,8 @@ vsh_result vshi_gltf_accessor_open(vshi_gltf *gltf, size_t index, vshi_gltf_acce
     VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
     if (view != SIZE_MAX) {
         const size_t size = (size_t)accessor->components * vshi_gltf_component_size(accessor->type);
-        VSHI_TRY(
-            place(gltf, where, view, offset, accessor->count, size, &accessor->at, &accessor->stride, error));
+        VSHI_TRY(find_elements(gltf, where, view, offset, accessor->count, size, &accessor->at,
+                               &accessor->stride, error));
     }
     const json_t *sparse = json_object_get(given, "sparse");
     return sparse != NULL ? open_sparse(gltf, sparse, where, accessor, error) : VSH_OK;
@@ -511,26 +488,26 @@ static float normalize(float given, int type) {
     return one > 0.0F ? fmaxf(given / one, -1.0F) : given;
 }
 
-/* Takes the element at `at` as element i of `to`. */
-typedef void take_fn(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to);
+/* Copies the element at `at` to element i of `to`. */
+typedef void copy_fn(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to);
 
-/* All elements, of `size` bytes in `to`: zeros or those of the view, and those that replace some. */
-static inline void take_elements(const vshi_gltf_accessor *a, take_fn *take, void *to, size_t size) {
+/* Copies all elements, `size` bytes each in `to`: zeros or those of the view, then the sparse ones. */
+static inline void copy_elements(const vshi_gltf_accessor *a, copy_fn *copy, void *to, size_t size) {
     const size_t index_size = vshi_gltf_component_size(a->sparse_type);
     const size_t value_size = (size_t)a->components * vshi_gltf_component_size(a->type);
     if (a->at == NULL) {
         memset(to, 0, a->count * size);
     }
     for (size_t i = 0; i < a->count && a->at != NULL; ++i) {
-        take(a, a->at + i * a->stride, i, to);
+        copy(a, a->at + i * a->stride, i, to);
     }
     for (size_t i = 0; i < a->sparse_count; ++i) {
         const size_t index = (size_t)vshi_gltf_component(a->sparse_at + i * index_size, a->sparse_type);
-        take(a, a->sparse_values + i * value_size, index, to);
+        copy(a, a->sparse_values + i * value_size, index, to);
     }
 }
 
-static void take_floats(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
+static void copy_floats(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
     const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
     for (size_t k = 0; k < n; ++k) {
         const float given = (float)vshi_gltf_component(at + k * size, a->type);
@@ -539,10 +516,10 @@ static void take_floats(const vshi_gltf_accessor *a, const unsigned char *at, si
 }
 
 void vshi_gltf_accessor_floats(const vshi_gltf_accessor *a, float *values) {
-    take_elements(a, take_floats, values, (size_t)a->components * sizeof *values);
+    copy_elements(a, copy_floats, values, (size_t)a->components * sizeof *values);
 }
 
-static void take_integers(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
+static void copy_integers(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
     const size_t n = (size_t)a->components, size = vshi_gltf_component_size(a->type);
     for (size_t k = 0; k < n; ++k) {
         ((uint32_t *)to)[n * i + k] = (uint32_t)vshi_gltf_component(at + k * size, a->type);
@@ -550,14 +527,14 @@ static void take_integers(const vshi_gltf_accessor *a, const unsigned char *at, 
 }
 
 void vshi_gltf_accessor_integers(const vshi_gltf_accessor *a, uint32_t *values) {
-    take_elements(a, take_integers, values, (size_t)a->components * sizeof *values);
+    copy_elements(a, copy_integers, values, (size_t)a->components * sizeof *values);
 }
 
-static void take_bytes(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
+static void copy_bytes(const vshi_gltf_accessor *a, const unsigned char *at, size_t i, void *to) {
     const size_t size = (size_t)a->components * vshi_gltf_component_size(a->type);
     memcpy((unsigned char *)to + i * size, at, size);
 }
 
 void vshi_gltf_accessor_bytes(const vshi_gltf_accessor *a, unsigned char *bytes) {
-    take_elements(a, take_bytes, bytes, (size_t)a->components * vshi_gltf_component_size(a->type));
+    copy_elements(a, copy_bytes, bytes, (size_t)a->components * vshi_gltf_component_size(a->type));
 }

@@ -1,11 +1,11 @@
-/* Materials of a glTF, as far as they decide where light comes through: alphaMode and the alpha of the base
- * colour's texture (glTF 2.0, 3.9.4; KHR_texture_transform). */
+/* The transparency of a glTF's materials: alphaMode and the alpha of the base colour's texture
+ * (glTF 2.0, 3.9.4; KHR_texture_transform). */
 #include "model/gltf.h"
 
 #include "base/elementary.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/uri.h"
+#include "base/text.h"
 
 #include <float.h>
 #include <math.h>
@@ -13,70 +13,70 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- what the texture is */
+/* --- samplers and transforms of textures */
 
-static int32_t wrap_of(const json_t *sampler, const char *key) {
+static int32_t read_wrap(const json_t *sampler, const char *key) {
     enum { CLAMP = 33071, MIRROR = 33648 };
     const double code = json_number_value(json_object_get(sampler, key));
     return code == CLAMP ? VSH_WRAP_CLAMP : code == MIRROR ? VSH_WRAP_MIRROR : VSH_WRAP_REPEAT;
 }
 
-/* Offset × rotation × scale, of UVs with v down. The rotation turns as in Blender, Babylon and three.js, not
- * as in the extension's own code (glTF issue 1563). */
+/* Copies a transform without -0; returns false if a number does not fit into a float. */
+static bool copy_transform(const double from[6], double to[6]) {
+    bool good = true;
+    for (int i = 0; i < 6; ++i) {
+        good = good && fabs(from[i]) <= FLT_MAX;
+        to[i] = from[i] + 0.0;
+    }
+    return good;
+}
+
+/* Reads offset × rotation × scale, for UVs with v down. Rotates like Blender, Babylon and three.js, not like
+ * the extension's own code (glTF issue 1563). */
 static bool read_transform(const json_t *transform, double down[6]) {
-    double offset[2] = {0.0, 0.0}, scale[2] = {1.0, 1.0}, angle = 0.0;
+    double offset[2] = {0.0, 0.0}, scale[2] = {1.0, 1.0};
     const json_t *rotation = json_object_get(transform, "rotation");
-    bool good = vshi_gltf_numbers(transform, "offset", 2, offset) &&
-                vshi_gltf_numbers(transform, "scale", 2, scale) &&
-                (rotation == NULL || json_is_number(rotation));
-    angle = rotation != NULL ? json_number_value(rotation) : angle;
+    const bool good = vshi_gltf_numbers(transform, "offset", 2, offset) &&
+                      vshi_gltf_numbers(transform, "scale", 2, scale) &&
+                      (rotation == NULL || json_is_number(rotation));
+    const double angle = json_number_value(rotation); /* 0 if it is NULL */
     const double c = vshi_cos(angle), s = vshi_sin(angle);
     const double rows[6] = {c * scale[0], s * scale[1], offset[0], -s * scale[0], c * scale[1], offset[1]};
-    for (int i = 0; i < 6; ++i) {
-        good = good && fabs(rows[i]) <= FLT_MAX;
-        down[i] = rows[i] + 0.0;
-    }
-    return good;
+    return copy_transform(rows, down) && good;
 }
 
-/* The same, from UVs with v up to an image with v up. */
+/* Reads the same for UVs and images with v up. */
 static bool read_transform_up(const json_t *transform, double up[6]) {
     double down[6];
-    bool good = read_transform(transform, down);
+    const bool good = read_transform(transform, down);
     const double rows[6] = {down[0], -down[1], down[1] + down[2], -down[3], down[4], 1.0 - down[4] - down[5]};
-    for (int i = 0; i < 6; ++i) {
-        good = good && fabs(rows[i]) <= FLT_MAX;
-        up[i] = rows[i] + 0.0;
-    }
-    return good;
+    return copy_transform(rows, up) && good;
 }
 
-/* --- UVs that a packer turned into integers */
-
-static const double as_they_are[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+/* --- UVs that a packer stored as integers */
 
 static void add_texture(const json_t *info, size_t wanted, vshi_gltf_unpacking *u, bool *any) {
-    const json_t *told = vshi_gltf_extension(info, "KHR_texture_transform");
+    const json_t *extension = vshi_gltf_extension(info, "KHR_texture_transform");
     size_t own, set;
     double transform[6];
     if (json_object_get(info, "index") == NULL || !vshi_gltf_count(info, "texCoord", 0, &own) ||
-        !vshi_gltf_count(told, "texCoord", own, &set) || set != wanted) {
+        !vshi_gltf_count(extension, "texCoord", own, &set) || set != wanted) {
         return;
     }
-    if (!read_transform(told, transform) ||
+    if (!read_transform(extension, transform) ||
         (*any && memcmp(u->transform, transform, sizeof transform) != 0)) {
         u->uvs = VSHI_GLTF_UVS_MIXED;
         return;
     }
-    if (!*any && memcmp(transform, as_they_are, sizeof transform) != 0) {
+    if (!*any && memcmp(transform, vshi_uv_identity, sizeof transform) != 0) {
         u->uvs = VSHI_GLTF_UVS_PACKED;
     }
     *any = true;
-    u->told = told;
+    u->extension = extension;
     memcpy(u->transform, transform, sizeof transform);
 }
 
-/* Looks at all textures at or below `value`. */
+/* Adds all textures at or below `value`. */
 static void add_textures(json_t *value, size_t set, vshi_gltf_unpacking *u, bool *any) {
     size_t i;
     const char *name;
@@ -91,13 +91,13 @@ static void add_textures(json_t *value, size_t set, vshi_gltf_unpacking *u, bool
 }
 
 vshi_gltf_unpacking vshi_gltf_find_unpacking(const vshi_gltf *gltf, size_t material, size_t set) {
-    vshi_gltf_unpacking u = {.uvs = VSHI_GLTF_UVS_PLAIN, .looked = true};
+    vshi_gltf_unpacking u = {.uvs = VSHI_GLTF_UVS_PLAIN, .found = true};
     bool any = false;
     add_textures(json_array_get(json_object_get(gltf->root, "materials"), material), set, &u, &any);
     return u;
 }
 
-static bool is_integer(const vshi_gltf *gltf, const json_t *attributes, int set) {
+static bool has_integer_uvs(const vshi_gltf *gltf, const json_t *attributes, int set) {
     char name[32];
     size_t accessor, type;
     snprintf(name, sizeof name, "TEXCOORD_%d", set);
@@ -109,13 +109,13 @@ static bool is_integer(const vshi_gltf *gltf, const json_t *attributes, int set)
 
 /* Finds the transform of each set that a primitive stores as integers. It applies to all primitives of the
  * material, so that their UVs fit the material's mask. */
-static vsh_result note_packed(vshi_gltf *gltf, const json_t *primitive, vsh_error *error) {
+static vsh_result find_packed_sets(vshi_gltf *gltf, const json_t *primitive, vsh_error *error) {
     const size_t count = gltf->model->material_count, material = vshi_gltf_material(gltf, primitive);
     if (material == SIZE_MAX) {
         return VSH_OK;
     }
     for (int set = 0; set < VSH_MAX_UV_SETS; ++set) {
-        if (!is_integer(gltf, json_object_get(primitive, "attributes"), set)) {
+        if (!has_integer_uvs(gltf, json_object_get(primitive, "attributes"), set)) {
             continue;
         }
         if (gltf->unpackings == NULL) {
@@ -123,32 +123,32 @@ static vsh_result note_packed(vshi_gltf *gltf, const json_t *primitive, vsh_erro
                                         sizeof(vshi_gltf_unpacking[VSH_MAX_UV_SETS]), error));
         }
         vshi_gltf_unpacking *u = &gltf->unpackings[material * VSH_MAX_UV_SETS + (size_t)set];
-        *u = u->looked ? *u : vshi_gltf_find_unpacking(gltf, material, (size_t)set);
+        *u = u->found ? *u : vshi_gltf_find_unpacking(gltf, material, (size_t)set);
     }
     return VSH_OK;
 }
 
-static vsh_result find_packed(vshi_gltf *gltf, vsh_error *error) {
+static vsh_result find_all_packed(vshi_gltf *gltf, vsh_error *error) {
     size_t m, p;
     json_t *mesh, *primitive;
     json_array_foreach(json_object_get(gltf->root, "meshes"), m, mesh) {
         json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
-            VSHI_TRY(note_packed(gltf, primitive, error));
+            VSHI_TRY(find_packed_sets(gltf, primitive, error));
         }
     }
     return VSH_OK;
 }
 
-/* --- its image */
+/* --- images */
 
-static vsh_result take_path(const vshi_gltf *gltf, const char *where, const char *uri,
-                            vshi_model_image *image, vsh_error *error) {
+static vsh_result find_image_file(const vshi_gltf *gltf, const char *where, const char *uri,
+                                  vshi_model_image *image, vsh_error *error) {
     if (vshi_uri_is_remote(uri)) {
         return vshi_gltf_fail(gltf, error, "%s is '%.200s': only files beside it are read", where, uri);
     }
     image->path = vshi_uri_path(gltf->path, uri);
     if (image->path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", gltf->path);
+        return vshi_fail_memory(error, gltf->path);
     }
     if (gltf->run->allow_outside != 0 || vshi_input_is_beside(gltf->path, image->path)) {
         return VSH_OK;
@@ -160,8 +160,8 @@ static vsh_result take_path(const vshi_gltf *gltf, const char *where, const char
     return result;
 }
 
-static vsh_result take_view(vshi_gltf *gltf, const char *where, size_t view, vshi_model_image *image,
-                            vsh_error *error) {
+static vsh_result copy_image_bytes(vshi_gltf *gltf, const char *where, size_t view, vshi_model_image *image,
+                                   vsh_error *error) {
     vshi_gltf_bytes bytes;
     size_t stride;
     VSHI_TRY(vshi_gltf_view(gltf, view, &bytes, &stride, error));
@@ -174,7 +174,7 @@ static vsh_result take_view(vshi_gltf *gltf, const char *where, size_t view, vsh
     return VSH_OK;
 }
 
-/* Where it has not been read yet. */
+/* Reads an image, once. */
 static vsh_result read_image(vshi_gltf *gltf, size_t index, vsh_error *error) {
     char where[32];
     snprintf(where, sizeof where, "images[%zu]", index);
@@ -186,16 +186,16 @@ static vsh_result read_image(vshi_gltf *gltf, size_t index, vsh_error *error) {
         return VSH_OK;
     }
     VSHI_TRY(vshi_gltf_index(gltf, given, "bufferView", "bufferViews", where, &view, error));
-    VSHI_TRY(view != SIZE_MAX ? take_view(gltf, where, view, image, error)
+    VSHI_TRY(view != SIZE_MAX ? copy_image_bytes(gltf, where, view, image, error)
              : uri == NULL    ? vshi_gltf_fail(gltf, error, "%s has neither a URI nor a buffer view", where)
              : vshi_uri_is_data(uri)
                  ? vshi_gltf_read_data(gltf, where, uri, &image->owned, &image->size, error)
-                 : take_path(gltf, where, uri, image, error));
+                 : find_image_file(gltf, where, uri, image, error));
     image->bytes = image->owned;
     return VSH_OK;
 }
 
-/* The image of a texture: where it names none, that of an extension for other formats; SIZE_MAX: none. */
+/* Finds the image of a texture, by default that of an extension for other formats; SIZE_MAX: none. */
 static vsh_result find_image(const vshi_gltf *gltf, const json_t *texture, const char *where, size_t *image,
                              vsh_error *error) {
     static const char *const others[] = {"EXT_texture_webp", "EXT_texture_avif", "MSFT_texture_dds",
@@ -211,7 +211,7 @@ static vsh_result find_image(const vshi_gltf *gltf, const json_t *texture, const
 static vsh_result read_texture(vshi_gltf *gltf, const json_t *info, const char *where,
                                vshi_model_material *material, vsh_error *error) {
     const json_t *transform = vshi_gltf_extension(info, "KHR_texture_transform");
-    vsh_model_material *told = &material->told;
+    vshi_material *values = &material->values;
     size_t texture, image, sampler, set, own_set;
     VSHI_TRY(vshi_gltf_index(gltf, info, "index", "textures", where, &texture, error));
     if (texture == SIZE_MAX) {
@@ -222,13 +222,13 @@ static vsh_result read_texture(vshi_gltf *gltf, const json_t *info, const char *
     VSHI_TRY(vshi_gltf_index(gltf, given, "sampler", "samplers", where, &sampler, error));
     if (!vshi_gltf_count(info, "texCoord", 0, &set) ||
         !vshi_gltf_count(transform, "texCoord", set, &own_set) || own_set >= VSH_MAX_UV_SETS ||
-        !read_transform_up(transform, told->uv_transform)) {
+        !read_transform_up(transform, values->uv_transform)) {
         return vshi_gltf_fail(gltf, error, "%s: the texCoord or transform of its texture is wrong", where);
     }
-    told->uv_set = (int32_t)own_set;
+    values->uv_set = (int32_t)own_set;
     if (sampler != SIZE_MAX) {
-        told->wrap[0] = wrap_of(vshi_gltf_element(gltf, "samplers", sampler), "wrapS");
-        told->wrap[1] = wrap_of(vshi_gltf_element(gltf, "samplers", sampler), "wrapT");
+        values->wrap[0] = read_wrap(vshi_gltf_element(gltf, "samplers", sampler), "wrapS");
+        values->wrap[1] = read_wrap(vshi_gltf_element(gltf, "samplers", sampler), "wrapT");
     }
     if (image != SIZE_MAX) {
         VSHI_TRY(read_image(gltf, image, error));
@@ -239,30 +239,30 @@ static vsh_result read_texture(vshi_gltf *gltf, const json_t *info, const char *
 
 /* --- materials */
 
-static int32_t alpha_of(const json_t *given) {
+static int32_t read_alpha_mode(const json_t *given) {
     const char *mode = json_string_value(json_object_get(given, "alphaMode"));
     return mode != NULL && strcmp(mode, "BLEND") == 0  ? VSH_ALPHA_BLENDED
            : mode != NULL && strcmp(mode, "MASK") == 0 ? VSH_ALPHA_MASKED
                                                        : VSH_ALPHA_OPAQUE;
 }
 
-/* A number between limits; else the fallback. */
-static double number_or(const json_t *given, double lowest, double highest, double fallback) {
+/* Reads a number between limits; otherwise returns the fallback. */
+static double read_number(const json_t *given, double lowest, double highest, double fallback) {
     const double number = json_number_value(given);
     return json_is_number(given) && number >= lowest && number <= highest ? number : fallback;
 }
 
-/* What casts by its texture needs that; of others only what they are is told. A texture that cannot be had is
- * left out with a warning: the mesh is there all the same. */
+/* Reads the alpha and texture of a material that is not opaque. A texture that cannot be read gives a
+ * warning: the mesh is still usable. */
 static vsh_result read_mask(vshi_gltf *gltf, const json_t *given, const char *where,
                             vshi_model_material *material, vsh_error *error) {
     const json_t *surface = json_object_get(given, "pbrMetallicRoughness");
     vsh_error why;
-    if (material->told.alpha == VSH_ALPHA_MASKED) {
-        material->told.alpha_cutoff = number_or(json_object_get(given, "alphaCutoff"), 0.0, FLT_MAX, 0.5);
+    if (material->values.alpha == VSH_ALPHA_MASKED) {
+        material->values.alpha_cutoff = read_number(json_object_get(given, "alphaCutoff"), 0.0, FLT_MAX, 0.5);
     }
-    material->told.base_alpha =
-        number_or(json_array_get(json_object_get(surface, "baseColorFactor"), 3), 0.0, 1.0, 1.0);
+    material->values.base_alpha =
+        read_number(json_array_get(json_object_get(surface, "baseColorFactor"), 3), 0.0, 1.0, 1.0);
     const vsh_result result =
         read_texture(gltf, json_object_get(surface, "baseColorTexture"), where, material, &why);
     if (result == VSH_ERROR_INPUT || result == VSH_ERROR_READ || result == VSH_ERROR_UNSUPPORTED) {
@@ -277,7 +277,7 @@ vsh_result vshi_gltf_mask_image(const vshi_gltf *gltf, const json_t *material, s
     const json_t *surface = json_object_get(material, "pbrMetallicRoughness");
     size_t texture;
     *image = SIZE_MAX;
-    if (alpha_of(material) == VSH_ALPHA_OPAQUE) {
+    if (read_alpha_mode(material) == VSH_ALPHA_OPAQUE) {
         return VSH_OK;
     }
     VSHI_TRY(vshi_gltf_index(gltf, json_object_get(surface, "baseColorTexture"), "index", "textures",
@@ -293,30 +293,30 @@ vsh_result vshi_gltf_read_materials(vshi_gltf *gltf, vsh_error *error) {
     const size_t count = json_array_size(materials);
     const size_t images = json_array_size(json_object_get(gltf->root, "images"));
     VSHI_TRY(vshi_gltf_hold(gltf, (double)count * sizeof *model->materials, error));
-    VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
+    VSHI_TRY(vshi_model_add_materials(model, count, error));
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&model->images, images, sizeof *model->images, error));
     model->image_count = images;
-    VSHI_TRY(find_packed(gltf, error));
+    VSHI_TRY(find_all_packed(gltf, error));
     for (size_t i = 0; i < count; ++i) {
         const json_t *given = json_array_get(materials, i);
         vshi_model_material *material = &model->materials[i];
         char where[32];
         snprintf(where, sizeof where, "materials[%zu]", i);
-        material->told.alpha = alpha_of(given);
-        material->told.double_sided = json_is_true(json_object_get(given, "doubleSided"));
+        material->values.alpha = read_alpha_mode(given);
+        material->values.double_sided = json_is_true(json_object_get(given, "doubleSided"));
         const char *name = json_string_value(json_object_get(given, "name"));
         if (name != NULL && name[0] != '\0') {
             VSHI_TRY(vshi_gltf_hold(gltf, (double)strlen(name), error));
             VSHI_TRY(vshi_model_copy_line(name, &material->name, error));
         }
-        if (material->told.alpha != VSH_ALPHA_OPAQUE) {
+        if (material->values.alpha != VSH_ALPHA_OPAQUE) {
             VSHI_TRY(read_mask(gltf, given, where, material, error));
         }
-        const size_t set = (size_t)material->told.uv_set;
+        const size_t set = (size_t)material->values.uv_set;
         if (gltf->unpackings != NULL &&
             gltf->unpackings[i * VSH_MAX_UV_SETS + set].uvs == VSHI_GLTF_UVS_PACKED) {
-            memcpy(material->told.uv_transform, as_they_are,
-                   sizeof as_they_are); /* the UVs have it already */
+            /* the UVs are transformed already */
+            memcpy(material->values.uv_transform, vshi_uv_identity, sizeof vshi_uv_identity);
         }
     }
     return VSH_OK;

@@ -1,4 +1,4 @@
-/* A mesh's primitive: its vertices, and its triangles from lists, strips and fans. */
+/* Reads a mesh's primitive: vertices, triangles of lists, strips and fans, and its pose. */
 #include "model/gltf.h"
 
 #include "base/memory.h"
@@ -45,7 +45,7 @@ static vsh_result check_indices(const char *path, const char *where, const uint3
     return VSH_OK;
 }
 
-/* The vertices in the order that a primitive draws them in: *order, *count of them. */
+/* Reads the order in which a primitive draws its vertices: *count of them. */
 static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t vertex_count, const char *where,
                              uint32_t **order, size_t *count, vsh_error *error) {
     vshi_gltf_accessor accessor;
@@ -70,8 +70,8 @@ static vsh_result read_order(vshi_gltf *gltf, const json_t *primitive, size_t ve
     return check_indices(gltf->path, where, *order, *count, vertex_count, error);
 }
 
-/* Triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
-static void pick(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3]) {
+/* Finds triangle i of a strip or a fan (glTF 2.0, 3.7.2.1). */
+static void find_triangle(size_t mode, const uint32_t *order, size_t i, uint32_t corner[3]) {
     if (mode == VSHI_GLTF_STRIP) {
         corner[0] = order[i];
         corner[1] = order[i + 1 + i % 2];
@@ -96,7 +96,7 @@ vsh_result vshi_gltf_read_triangles(vshi_gltf *gltf, const json_t *primitive, si
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&triangles, count, sizeof(uint32_t[3]), error));
     for (size_t i = 0; i + 2 < count; ++i) {
         uint32_t corner[3];
-        pick(mode, *corners, i, corner);
+        find_triangle(mode, *corners, i, corner);
         if (corner[0] != corner[1] && corner[1] != corner[2] && corner[2] != corner[0]) {
             memcpy(triangles + 3 * (*triangle_count)++, corner, sizeof corner);
         }
@@ -112,16 +112,8 @@ vsh_result vshi_gltf_draco_indices(vshi_gltf *gltf, const vshi_draco *mesh, cons
                                    uint32_t **indices, vsh_error *error) {
     const size_t count = mesh->triangle_count;
     VSHI_TRY(vshi_gltf_allocate(gltf, (void **)indices, count, sizeof(uint32_t[3]), error));
-    if (count > 0) {
-        vshi_importers()->draco_indices(mesh, *indices);
-    }
-    for (size_t i = 0; i < 3 * count; ++i) {
-        if ((*indices)[i] >= mesh->vertex_count) {
-            return vshi_gltf_fail(gltf, error, "%s: its Draco data uses vertex %u of %zu", where,
-                                  (*indices)[i], mesh->vertex_count);
-        }
-    }
-    return VSH_OK;
+    vshi_importers()->draco_indices(mesh, *indices);
+    return check_indices(gltf->path, where, *indices, 3 * count, mesh->vertex_count, error);
 }
 
 vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, const char *where,
@@ -143,7 +135,7 @@ vsh_result vshi_gltf_decode_draco(vshi_gltf *gltf, const json_t *extension, cons
 typedef struct primitive {
     vshi_gltf *gltf;
     const json_t *given, *attributes;
-    const vshi_draco *draco; /* where vertices come from; NULL: accessors */
+    const vshi_draco *draco; /* the source of vertices; NULL: accessors */
     const vshi_gltf_pose *pose;
     const char *where;
     vshi_model_shape *shape;
@@ -164,14 +156,14 @@ static vsh_result read_array(const primitive *p, const char *name, int component
         return VSH_OK;
     }
     VSHI_TRY(vshi_gltf_allocate(p->gltf, (void **)array, count, (size_t)components * sizeof **array, error));
-    return id <= UINT32_MAX && vshi_importers()->draco_elements(p->draco, (uint32_t)id, VSHI_DRACO_FLOAT,
+    return id <= UINT32_MAX && vshi_importers()->draco_elements(p->draco, (uint32_t)id, VSHI_GLTF_FLOAT,
                                                                 components, *array)
                ? VSH_OK
                : vshi_gltf_fail(p->gltf, error, "%s: its Draco data has no attribute %zu of %d components",
                                 p->where, id, components);
 }
 
-/* Positions, normals and sets of UVs. */
+/* Reads positions, normals and sets of UVs. */
 static vsh_result read_vertices(const primitive *p, vsh_error *error) {
     vshi_model_shape *shape = p->shape;
     VSHI_TRY(read_array(p, "POSITION", 3, &shape->positions, error));
@@ -185,8 +177,7 @@ static vsh_result read_vertices(const primitive *p, vsh_error *error) {
     return VSH_OK;
 }
 
-/* The alpha of its vertices' colours, where one of them is not whole (3.7.2.1: COLOR_0 multiplies the base
- * colour). */
+/* Reads the alpha of vertex colours, unless all are 1 (3.7.2.1: COLOR_0 multiplies the base colour). */
 static vsh_result read_alphas(const primitive *p, vsh_error *error) {
     const size_t count = p->shape->vertex_count;
     vshi_gltf_accessor accessor;
@@ -213,7 +204,7 @@ static vsh_result read_alphas(const primitive *p, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Fills positions, normals, UVs and indices of one under KHR_draco_mesh_compression. */
+/* Reads positions, normals, UVs and indices of KHR_draco_mesh_compression. */
 static vsh_result read_draco(primitive *p, const json_t *extension, vsh_error *error) {
     vshi_draco *mesh = NULL;
     vsh_result result;
@@ -237,7 +228,7 @@ static vsh_result read_plain(const primitive *p, size_t mode, vsh_error *error) 
     vshi_gltf_accessor accessor;
     VSHI_TRY(vshi_gltf_accessor_find(p->gltf, p->attributes, "POSITION", p->where, &accessor, error));
     if (accessor.count == 0) {
-        return VSH_OK; /* without positions there is nothing to see (3.7.2.1) */
+        return VSH_OK; /* primitives without positions are invisible (3.7.2.1) */
     }
     shape->vertex_count = accessor.count;
     VSHI_TRY(vshi_gltf_read_triangles(p->gltf, p->given, mode, accessor.count, p->where, &shape->indices,
@@ -250,7 +241,7 @@ static vsh_result read_plain(const primitive *p, size_t mode, vsh_error *error) 
 }
 
 /* --- the rest pose: morph targets at their default weights (glTF 2.0, 3.7.2.2), then skins, which move
- * vertices by their joints and leave the node's own transform out (3.7.3.3) */
+ * vertices by joints instead of the node's transform (3.7.3.3) */
 
 static vsh_result add_target(const primitive *p, const json_t *target, const char *name, double weight,
                              float *values, vsh_error *error) {
@@ -328,8 +319,7 @@ static vsh_result add_sets(const primitive *p, vshi_model_blend *blends, vsh_err
     return VSH_OK;
 }
 
-/* Moves positions (and normals) to where the pose has them. A vertex without weights follows the first joint.
- */
+/* Moves positions and normals by the pose. A vertex without weights follows the first joint. */
 static vsh_result apply_pose(const primitive *p, vsh_error *error) {
     VSHI_TRY(morph(p, error));
     if (p->pose->joints == NULL || p->pose->joint_count == 0) {
@@ -347,53 +337,36 @@ static vsh_result apply_pose(const primitive *p, vsh_error *error) {
 
 /* --- the finished shape */
 
-/* The vertices that are used move together. */
-static vsh_result renumber(const char *path, const unsigned char *used, vshi_model_shape *shape,
-                           vsh_error *error) {
-    uint32_t *place = NULL, next = 0;
-    VSHI_TRY(vshi_allocate((void **)&place, shape->vertex_count, sizeof *place, path, error));
+/* Keeps only used vertices: many primitives may share one large accessor. */
+static vsh_result drop_unused(const char *path, vshi_model_shape *shape, vsh_error *error) {
+    static const uint32_t unused = UINT32_MAX;
+    uint32_t *place, count = 0;
+    VSHI_TRY(VSHI_ALLOCATE(place, shape->vertex_count, path, error));
+    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
+        place[shape->indices[i]] = 1;
+    }
     for (size_t v = 0; v < shape->vertex_count; ++v) {
-        place[v] = next;
-        next += used[v];
+        place[v] = place[v] > 0 ? count++ : unused;
     }
     for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
         shape->indices[i] = place[shape->indices[i]];
     }
-    for (int k = 0; k < VSHI_MODEL_ARRAYS; ++k) {
+    for (int k = 0; k < VSHI_MODEL_ARRAYS && count < shape->vertex_count; ++k) {
         const vshi_model_array array = vshi_model_array_of(shape, k);
         char *values = *array.at;
         for (size_t v = 0; v < array.count && values != NULL && k != VSHI_MODEL_INDICES; ++v) {
-            if (used[v] != 0) {
+            if (place[v] != unused) {
                 memmove(values + array.size * place[v], values + array.size * v, array.size);
             }
         }
     }
     free(place);
-    shape->vertex_count = next;
+    shape->vertex_count = count;
     return VSH_OK;
 }
 
-/* Many primitives may share one large accessor, of which each uses a part: only that is kept. */
-static vsh_result drop_unused(const char *path, vshi_model_shape *shape, vsh_error *error) {
-    unsigned char *used = NULL;
-    size_t count = 0;
-    vsh_result result = VSH_OK;
-    VSHI_TRY(vshi_allocate((void **)&used, shape->vertex_count, 1, path, error));
-    for (size_t i = 0; i < 3 * shape->triangle_count; ++i) {
-        used[shape->indices[i]] = 1;
-    }
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        count += used[v];
-    }
-    if (count < shape->vertex_count) {
-        result = renumber(path, used, shape, error);
-    }
-    free(used);
-    return result;
-}
-
-/* Turns UVs that a packer stored as integers back, and v of all up, which points down in glTF. */
-static void turn_uvs(const vshi_gltf *gltf, vshi_model_shape *shape) {
+/* Restores UVs that a packer stored as integers, and turns v of all up, which points down in glTF. */
+static void convert_uvs(const vshi_gltf *gltf, vshi_model_shape *shape) {
     static const vshi_gltf_unpacking none = {.uvs = VSHI_GLTF_UVS_PLAIN};
     for (int set = 0; set < shape->uv_sets; ++set) {
         const vshi_gltf_unpacking *u =
@@ -433,7 +406,7 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *given, const 
                    .shape = shape};
     size_t mode;
     if (!vshi_gltf_count(given, "mode", VSHI_GLTF_TRIANGLES, &mode) || mode > VSHI_GLTF_FAN) {
-        return vshi_gltf_fail(gltf, error, "%s: its mode is none", where);
+        return vshi_gltf_fail(gltf, error, "%s: its mode is unknown", where);
     }
     if (mode < VSHI_GLTF_TRIANGLES) {
         return VSH_OK; /* points or lines */
@@ -442,7 +415,7 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *given, const 
     const size_t material = vshi_gltf_material(gltf, given);
     if (material != SIZE_MAX) {
         shape->material = (int32_t)material + 1;
-        shape->alpha = gltf->model->materials[material].told.alpha;
+        shape->alpha = gltf->model->materials[material].values.alpha;
     }
     VSHI_TRY(draco != NULL ? read_draco(&p, draco, error) : read_plain(&p, mode, error));
     if (shape->triangle_count == 0) {
@@ -452,6 +425,6 @@ vsh_result vshi_gltf_read_primitive(vshi_gltf *gltf, const json_t *given, const 
     VSHI_TRY(drop_unused(gltf->path, shape, error));
     VSHI_TRY(vshi_model_check_positions(gltf->path, where, shape->positions, shape->vertex_count, error));
     vshi_model_check_normals(gltf->path, gltf->run, where, shape);
-    turn_uvs(gltf, shape);
+    convert_uvs(gltf, shape);
     return VSH_OK;
 }

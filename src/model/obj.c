@@ -1,5 +1,5 @@
-/* The statements of an OBJ. Vertices are numbered as faces use them: corners of a mesh that have the same
- * place, texture coordinate and normal are one. */
+/* Reads the statements of an OBJ. Numbers vertices in the order of faces: corners of a mesh with the same
+ * position, texture coordinate and normal are one vertex. */
 #include "model/obj.h"
 
 #include "base/decimal.h"
@@ -9,8 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Objects, groups and materials part an OBJ's faces into meshes, and name them, as Assimp 5.2 does: bakes
- * name their objects so. A group is an object; another material begins another mesh in it, which has the
+/* Objects, groups and materials split an OBJ's faces into meshes, with names as in Assimp 5.2, so that bakes
+ * keep the names of objects. A group is an object. Another material begins another mesh of it, with the
  * material's name. */
 
 static const char unnamed[] = "defaultobject";
@@ -19,8 +19,7 @@ static vsh_result name_number(vshi_obj *obj, const char *name, size_t size, size
                               vsh_error *error) {
     bool is_new;
     VSHI_TRY(vshi_words_number(&obj->names, &obj->budget, name, size, number, &is_new, error));
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->object_of, &obj->object_of_capacity, obj->names.count,
-                       sizeof *obj->object_of, error));
+    VSHI_TRY(VSHI_GROW(&obj->budget, obj->object_of, obj->object_of_capacity, obj->names.count, error));
     if (is_new) {
         obj->object_of[*number] = 0;
     }
@@ -28,8 +27,7 @@ static vsh_result name_number(vshi_obj *obj, const char *name, size_t size, size
 }
 
 static vsh_result add_mesh(vshi_obj *obj, size_t name, vsh_error *error) {
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->meshes, &obj->mesh_capacity, obj->mesh_count + 1,
-                       sizeof *obj->meshes, error));
+    VSHI_TRY(VSHI_GROW(&obj->budget, obj->meshes, obj->mesh_capacity, obj->mesh_count + 1, error));
     obj->mesh = obj->mesh_count++;
     obj->meshes[obj->mesh] = (vshi_obj_mesh){.name = name,
                                              .material = obj->material,
@@ -47,8 +45,7 @@ static vsh_result add_mesh(vshi_obj *obj, size_t name, vsh_error *error) {
 }
 
 static vsh_result add_object(vshi_obj *obj, size_t name, vsh_error *error) {
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->objects, &obj->object_capacity, obj->object_count + 1,
-                       sizeof *obj->objects, error));
+    VSHI_TRY(VSHI_GROW(&obj->budget, obj->objects, obj->object_capacity, obj->object_count + 1, error));
     obj->object = obj->object_count++;
     obj->objects[obj->object] =
         (vshi_obj_object){.name = name, .first_mesh = SIZE_MAX, .last_mesh = SIZE_MAX};
@@ -56,8 +53,8 @@ static vsh_result add_object(vshi_obj *obj, size_t name, vsh_error *error) {
     return add_mesh(obj, name, error);
 }
 
-/* Faces, lines or points follow: there is a mesh for them. */
-static vsh_result need_mesh(vshi_obj *obj, vsh_error *error) {
+/* Makes sure that there is a mesh for faces, lines or points. */
+static vsh_result require_mesh(vshi_obj *obj, vsh_error *error) {
     if (obj->object == SIZE_MAX) {
         size_t name;
         VSHI_TRY(name_number(obj, unnamed, sizeof unnamed - 1, &name, error));
@@ -100,8 +97,7 @@ static vsh_result set_group(vshi_obj *obj, const char *text, size_t size, vsh_er
 vsh_result vshi_obj_material(vshi_obj *obj, const char *name, size_t size, size_t *number, bool *is_new,
                              vsh_error *error) {
     VSHI_TRY(vshi_words_number(&obj->materials, &obj->budget, name, size, number, is_new, error));
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->alphas, &obj->alpha_capacity, obj->materials.count,
-                       sizeof *obj->alphas, error));
+    VSHI_TRY(VSHI_GROW(&obj->budget, obj->alphas, obj->alpha_capacity, obj->materials.count, error));
     if (*is_new) {
         obj->alphas[*number] = (vshi_obj_alpha){.opacity = 1.0};
     }
@@ -133,7 +129,7 @@ static vsh_result set_material(vshi_obj *obj, const char *text, size_t size, vsh
 
 static const struct {
     const char *name;
-    int least, kept; /* numbers that there must be; that are kept */
+    int least, kept; /* numbers: required; kept */
 } kinds[VSHI_OBJ_KINDS] = {
     {"vertex", 3, 3},
     {"texture coordinate", 1, 2},
@@ -142,7 +138,7 @@ static const struct {
 
 /* --- the model */
 
-/* Where each mesh ends is where the next begins. */
+/* Each mesh ends at the begin of the next. */
 static size_t vertex_end(const vshi_obj *obj, size_t mesh) {
     return mesh + 1 < obj->mesh_count ? obj->meshes[mesh + 1].first_vertex : obj->vertex_count;
 }
@@ -151,9 +147,10 @@ static size_t run_end(const vshi_obj *obj, size_t mesh) {
     return mesh + 1 < obj->mesh_count ? obj->meshes[mesh + 1].first_run : obj->faces.run_count;
 }
 
-/* The values of one kind of all vertices, which are the array `number` of their shapes; zeros where a corner
- * has none. */
-static vsh_result gather(vshi_obj *obj, int kind, int number, vsh_model *model, vsh_error *error) {
+/* Copies the values of one kind to array `number` of the shapes, with zeros for corners without values. Frees
+ * the values.
+ */
+static vsh_result copy_values(vshi_obj *obj, int kind, int number, vsh_model *model, vsh_error *error) {
     vshi_obj_values *values = &obj->kinds[kind];
     for (size_t m = 0; m < obj->mesh_count; ++m) {
         const vshi_model_array array = vshi_model_array_of(&model->shapes[m], number);
@@ -179,15 +176,14 @@ static vsh_result gather(vshi_obj *obj, int kind, int number, vsh_model *model, 
     return VSH_OK;
 }
 
-/* The faces' corners are what triangles are made of; where all are triangles, they are that. */
+/* Cuts the faces into triangles, or copies their corners if all are triangles. */
 static vsh_result make_triangles(vshi_obj *obj, size_t m, vshi_model_shape *shape, vsh_error *error) {
     const vshi_obj_mesh *mesh = &obj->meshes[m];
     const size_t run_count = run_end(obj, m) - mesh->first_run;
     const vshi_face_run *runs = run_count > 0 ? obj->faces.runs + mesh->first_run : NULL;
-    size_t capacity = 0;
     bool triangles;
-    const size_t most = vshi_faces_most(runs, run_count, &triangles);
-    VSHI_TRY(vshi_reserve(&obj->budget, &shape->indices, &capacity, most, sizeof(uint32_t[3]), error));
+    const size_t most = vshi_faces_count_triangles(runs, run_count, &triangles);
+    VSHI_TRY(vshi_reserve(&obj->budget, &shape->indices, &(size_t){0}, most, sizeof(uint32_t[3]), error));
     if (most == 0) {
         return VSH_OK;
     }
@@ -204,26 +200,24 @@ static vsh_result make_triangles(vshi_obj *obj, size_t m, vshi_model_shape *shap
     return result;
 }
 
-static int32_t alpha_of(const vshi_obj_alpha *alpha) {
+static int32_t find_alpha(const vshi_obj_alpha *alpha) {
     return alpha->opacity < 1.0 || alpha->image > 0 ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE;
 }
 
 static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error) {
-    size_t capacity = 0;
-    VSHI_TRY(
-        vshi_reserve(&obj->budget, &model->shapes, &capacity, obj->mesh_count, sizeof *model->shapes, error));
+    VSHI_TRY(VSHI_RESERVE(&obj->budget, model->shapes, obj->mesh_count, error));
     for (; model->shape_count < obj->mesh_count; ++model->shape_count) {
         const vshi_obj_mesh *mesh = &obj->meshes[model->shape_count];
         model->shapes[model->shape_count] = (vshi_model_shape){
             .uv_sets = mesh->has[VSHI_OBJ_TEXTURE],
             .vertex_count = vertex_end(obj, model->shape_count) - mesh->first_vertex,
-            .alpha = mesh->material != SIZE_MAX ? alpha_of(&obj->alphas[mesh->material]) : VSH_ALPHA_OPAQUE,
+            .alpha = mesh->material != SIZE_MAX ? find_alpha(&obj->alphas[mesh->material]) : VSH_ALPHA_OPAQUE,
             .material = mesh->material < obj->materials.count ? (int32_t)mesh->material + 1 : 0,
         };
     }
-    VSHI_TRY(gather(obj, VSHI_OBJ_POSITION, VSHI_MODEL_POSITIONS, model, error));
-    VSHI_TRY(gather(obj, VSHI_OBJ_TEXTURE, VSHI_MODEL_UVS, model, error));
-    VSHI_TRY(gather(obj, VSHI_OBJ_NORMAL, VSHI_MODEL_NORMALS, model, error));
+    VSHI_TRY(copy_values(obj, VSHI_OBJ_POSITION, VSHI_MODEL_POSITIONS, model, error));
+    VSHI_TRY(copy_values(obj, VSHI_OBJ_TEXTURE, VSHI_MODEL_UVS, model, error));
+    VSHI_TRY(copy_values(obj, VSHI_OBJ_NORMAL, VSHI_MODEL_NORMALS, model, error));
     for (size_t m = 0; m < obj->mesh_count; ++m) {
         VSHI_TRY(make_triangles(obj, m, &model->shapes[m], error));
     }
@@ -231,16 +225,16 @@ static vsh_result make_shapes(vshi_obj *obj, vsh_model *model, vsh_error *error)
 }
 
 static void make_material(const vshi_obj_alpha *from, vshi_model_material *material) {
-    vsh_model_material *told = &material->told;
+    vshi_material *values = &material->values;
     const double transform[6] = {from->scale[0], 0.0, from->offset[0], 0.0, from->scale[1], from->offset[1]};
-    told->alpha = alpha_of(from);
-    told->by_texture = 1;
-    told->base_alpha = from->opacity;
+    values->alpha = find_alpha(from);
+    values->by_texture = 1;
+    values->base_alpha = from->opacity;
     material->image = from->image;
     if (from->image > 0) {
-        told->image_channel = from->channel;
-        told->wrap[0] = told->wrap[1] = from->clamp ? VSH_WRAP_CLAMP : VSH_WRAP_REPEAT;
-        memcpy(told->uv_transform, transform, sizeof transform);
+        values->image_channel = from->channel;
+        values->wrap[0] = values->wrap[1] = from->clamp ? VSH_WRAP_CLAMP : VSH_WRAP_REPEAT;
+        memcpy(values->uv_transform, transform, sizeof transform);
     }
 }
 
@@ -249,22 +243,19 @@ static vsh_result hold(vshi_obj *obj, double bytes, vsh_error *error) {
     return vshi_check_limit(obj->run, obj->budget.bytes, obj->path, error);
 }
 
-/* Takes the materials' masks. */
+/* Copies the paths of the materials' masks. */
 static vsh_result make_images(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     const size_t count = obj->images.count;
     VSHI_TRY(hold(obj, (double)count * sizeof *model->images + (double)obj->images.used, error));
-    VSHI_TRY(vshi_allocate((void **)&model->images, count, sizeof *model->images, obj->path, error));
+    VSHI_TRY(VSHI_ALLOCATE(model->images, count, obj->path, error));
     model->image_count = count;
     for (size_t i = 0; i < count; ++i) {
-        model->images[i].path = strdup(obj->images.names[i]);
-        if (model->images[i].path == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
-        }
+        VSHI_TRY(vshi_copy_text(&model->images[i].path, obj->images.names[i], obj->path, error));
     }
     return VSH_OK;
 }
 
-/* Their names, and how much of them is there. */
+/* Copies the materials' names and transparency. */
 static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     const size_t count = obj->materials.count;
     if (count >= INT32_MAX) {
@@ -272,7 +263,7 @@ static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *err
                          INT32_MAX - 1);
     }
     VSHI_TRY(hold(obj, (double)count * sizeof *model->materials + (double)obj->materials.used, error));
-    VSHI_TRY(vshi_model_take_plain_materials(model, count, error));
+    VSHI_TRY(vshi_model_add_materials(model, count, error));
     for (size_t i = 0; i < count; ++i) {
         make_material(&obj->alphas[i], &model->materials[i]);
         VSHI_TRY(vshi_model_copy_line(obj->materials.names[i], &model->materials[i].name, error));
@@ -281,7 +272,6 @@ static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *err
 }
 
 static vsh_result add_entries(const vshi_obj *obj, vsh_model *model, vsh_error *error) {
-    static const double world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     for (size_t o = 0; o < obj->object_count; ++o) {
         const uint32_t number = vshi_model_next_object(model);
         for (size_t m = obj->objects[o].first_mesh + 1; m > 0; m = obj->meshes[m - 1].next) {
@@ -289,14 +279,13 @@ static vsh_result add_entries(const vshi_obj *obj, vsh_model *model, vsh_error *
                                             .mesh = obj->names.names[obj->meshes[m - 1].name],
                                             .object = number,
                                             .shape = m - 1,
-                                            .world = world};
+                                            .world = vshi_identity};
             if (model->shapes[m - 1].triangle_count > 0) {
                 VSHI_TRY(vshi_model_add(model, obj->path, obj->run, &place, error));
             }
         }
     }
-    return model->entry_count > 0 ? VSH_OK
-                                  : vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", obj->path);
+    return VSH_OK;
 }
 
 static vsh_result build_model(vshi_obj *obj, vsh_model *model, vsh_error *error) {
@@ -309,7 +298,8 @@ static vsh_result build_model(vshi_obj *obj, vsh_model *model, vsh_error *error)
     return add_entries(obj, model, error);
 }
 
-/* A place where more vertices than this differ in the rest (the pole of a sphere) gets some of them twice. */
+/* Vertices at one position that are compared. If more of them differ (the pole of a sphere), some are stored
+ * twice. */
 enum { LONGEST_CHAIN = 32 };
 
 static bool is_blank(char c) {
@@ -320,12 +310,12 @@ static bool is_line_end(char c) {
     return c == '\n' || c == '\r';
 }
 
-/* Whether a token may end before c. */
+/* Whether c ends a token. */
 static bool ends_token(char c) {
     return is_blank(c) || is_line_end(c);
 }
 
-/* The next thing of the statement: "\" and a line's end are a blank. */
+/* Skips blanks of the statement; "\" before a line's end is one. */
 static inline const char *skip_blanks(vshi_obj *obj, const char *c) {
     for (;;) {
         if (is_blank(*c)) {
@@ -343,7 +333,7 @@ static bool is_over(char c) {
     return is_line_end(c) || c == '#';
 }
 
-/* Behind the end of the line that c is in. */
+/* Returns the begin of the line after c. */
 static const char *skip_line(vshi_obj *obj, const char *c) {
     for (;; ++c) {
         if (*c == '\\') {
@@ -356,7 +346,7 @@ static const char *skip_line(vshi_obj *obj, const char *c) {
     }
 }
 
-static vshi_token token_at(const char *c) {
+static vshi_token find_token(const char *c) {
     vshi_token token = {c, 0};
     while (!ends_token(c[token.size])) {
         ++token.size;
@@ -367,23 +357,24 @@ static vshi_token token_at(const char *c) {
 /* --- v, vt, vn */
 
 static vsh_result fail_number(const vshi_obj *obj, int kind, const char *at, vsh_error *error) {
-    const vshi_token token = token_at(at);
+    const vshi_token token = find_token(at);
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: %s holds '%.*s', expected a finite number",
                      obj->path, obj->statement, kinds[kind].name, VSHI_TOKEN_ARGS(token));
 }
 
-/* x y z w is a place in homogeneous coordinates; what is behind x y z otherwise is a colour. */
-static vsh_result keep_place(vshi_obj *obj, int count, const float *number, float *place, vsh_error *error) {
-    memcpy(place, number, sizeof(float[3]));
+/* x y z w are homogeneous coordinates; other numbers after x y z are a colour. */
+static vsh_result convert_position(vshi_obj *obj, int count, const float *number, float *position,
+                                   vsh_error *error) {
+    memcpy(position, number, sizeof(float[3]));
     if (count != 4) {
         return VSH_OK;
     }
     for (int k = 0; k < 3; ++k) {
-        place[k] = number[k] / number[3];
-        if (!isfinite(place[k])) {
+        position[k] = number[k] / number[3];
+        if (!isfinite(position[k])) {
             return vshi_fail(error, VSH_ERROR_INPUT,
-                             "%s: line %zu: vertex's weight is %g, which puts it beyond what is finite",
-                             obj->path, obj->statement, (double)number[3]);
+                             "%s: line %zu: vertex's weight is %g, so its position is not finite", obj->path,
+                             obj->statement, (double)number[3]);
         }
     }
     return VSH_OK;
@@ -418,7 +409,7 @@ static vsh_result read_numbers(vshi_obj *obj, int kind, const char **at, vsh_err
     }
     float *to = values->values + size * values->count++;
     if (kind == VSHI_OBJ_POSITION) {
-        return keep_place(obj, count, number, to, error);
+        return convert_position(obj, count, number, to, error);
     }
     memcpy(to, number, size * sizeof(float));
     return VSH_OK;
@@ -427,12 +418,12 @@ static vsh_result read_numbers(vshi_obj *obj, int kind, const char **at, vsh_err
 /* --- f */
 
 static vsh_result fail_corner(const vshi_obj *obj, const char *corner, vsh_error *error) {
-    const vshi_token token = token_at(corner);
+    const vshi_token token = find_token(corner);
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: '%.*s' is no corner of a face", obj->path,
                      obj->statement, VSHI_TOKEN_ARGS(token));
 }
 
-/* A whole number of at most 18 digits; NULL: there is none. */
+/* Parses a whole number of at most 18 digits; returns its end, or NULL. */
 static inline const char *read_index(const char *c, int64_t *index) {
     enum { DIGITS = 18 };
     const bool negative = *c == '-';
@@ -446,8 +437,9 @@ static inline const char *read_index(const char *c, int64_t *index) {
     return c > first && c - first <= DIGITS ? c : NULL;
 }
 
-/* From 1, or from -1 backwards from the latest. */
-static inline vsh_result resolve(vshi_obj *obj, int kind, int64_t index, uint32_t *part, vsh_error *error) {
+/* Resolves an index from 1, or from -1 backwards from the latest value. */
+static inline vsh_result resolve_index(vshi_obj *obj, int kind, int64_t index, uint32_t *part,
+                                       vsh_error *error) {
     vshi_obj_values *values = &obj->kinds[kind];
     const int64_t count = (int64_t)values->count;
     if (index == 0 || index < -count) {
@@ -464,33 +456,34 @@ static inline vsh_result resolve(vshi_obj *obj, int kind, int64_t index, uint32_
     return VSH_OK;
 }
 
-/* Room for the heads of all places up to one; none for places that the file is too short to have, which is
- * found at its end. */
-static vsh_result reach_head(vshi_obj *obj, size_t place, bool *there, vsh_error *error) {
-    enum { LEAST_BYTES = 7 }; /* of a vertex: "v 0 0 0" */
-    *there = place <= obj->text.size / LEAST_BYTES && place < UINT32_MAX;
-    if (!*there || place <= obj->head_count) {
+/* Makes room for the heads of all positions up to one. *possible: the file is long enough for that many
+ * positions; otherwise check_indices() fails later. */
+static vsh_result reserve_heads(vshi_obj *obj, size_t position, bool *possible, vsh_error *error) {
+    enum { LEAST_BYTES = 7 }; /* a vertex is at least "v 0 0 0" */
+    *possible = position <= obj->text.size / LEAST_BYTES && position < UINT32_MAX;
+    if (!*possible || position <= obj->head_count) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->heads, &obj->head_capacity, place, sizeof *obj->heads, error));
+    VSHI_TRY(VSHI_GROW(&obj->budget, obj->heads, obj->head_capacity, position, error));
     memset(obj->heads + obj->head_count, 0, (obj->head_capacity - obj->head_count) * sizeof *obj->heads);
     obj->head_count = obj->head_capacity;
     return VSH_OK;
 }
 
-/* The vertex of the current mesh with these parts. */
-static vsh_result vertex_of(vshi_obj *obj, const uint32_t part[VSHI_OBJ_KINDS], uint32_t *vertex,
-                            vsh_error *error) {
-    bool there;
+/* Finds the vertex of the current mesh with these parts, or adds it. */
+static vsh_result find_vertex(vshi_obj *obj, const uint32_t part[VSHI_OBJ_KINDS], uint32_t *vertex,
+                              vsh_error *error) {
+    bool possible;
     const size_t first = obj->meshes[obj->mesh].first_vertex;
-    VSHI_TRY(reach_head(obj, part[0], &there, error));
-    if (!there) {
+    VSHI_TRY(reserve_heads(obj, part[0], &possible, error));
+    if (!possible) {
         *vertex = 0;
         return VSH_OK;
     }
     uint32_t *head = &obj->heads[part[0] - 1];
-    int looked = 0;
-    for (uint32_t v = *head; v > first && looked < LONGEST_CHAIN; v = obj->vertices[v - 1].next, ++looked) {
+    int compared = 0;
+    for (uint32_t v = *head; v > first && compared < LONGEST_CHAIN;
+         v = obj->vertices[v - 1].next, ++compared) {
         const uint32_t *other = obj->vertices[v - 1].part;
         if (other[1] == part[1] && other[2] == part[2]) {
             *vertex = (uint32_t)(v - 1 - first);
@@ -501,15 +494,14 @@ static vsh_result vertex_of(vshi_obj *obj, const uint32_t part[VSHI_OBJ_KINDS], 
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: line %zu: more than %u vertices", obj->path,
                          obj->statement, UINT32_MAX);
     }
-    VSHI_TRY(vshi_grow(&obj->budget, &obj->vertices, &obj->vertex_capacity, obj->vertex_count + 1,
-                       sizeof *obj->vertices, error));
+    VSHI_TRY(VSHI_GROW(&obj->budget, obj->vertices, obj->vertex_capacity, obj->vertex_count + 1, error));
     *vertex = (uint32_t)(obj->vertex_count - first);
     obj->vertices[obj->vertex_count++] = (vshi_obj_vertex){{part[0], part[1], part[2]}, *head};
     *head = (uint32_t)obj->vertex_count;
     return VSH_OK;
 }
 
-/* One corner: p, p/t, p//n or p/t/n. */
+/* Reads a corner: p, p/t, p//n or p/t/n. */
 static vsh_result read_corner(vshi_obj *obj, const char **at, uint32_t part[VSHI_OBJ_KINDS],
                               vsh_error *error) {
     const char *const corner = *at, *c = corner;
@@ -530,7 +522,7 @@ static vsh_result read_corner(vshi_obj *obj, const char **at, uint32_t part[VSHI
         if (c == NULL) {
             return fail_corner(obj, corner, error);
         }
-        VSHI_TRY(resolve(obj, kind, index, &part[kind], error));
+        VSHI_TRY(resolve_index(obj, kind, index, &part[kind], error));
         has[kind] = true;
     }
     *at = c;
@@ -540,14 +532,13 @@ static vsh_result read_corner(vshi_obj *obj, const char **at, uint32_t part[VSHI
 static vsh_result read_face(vshi_obj *obj, const char **at, vsh_error *error) {
     size_t size = 0;
     const char *c = *at;
-    VSHI_TRY(need_mesh(obj, error));
+    VSHI_TRY(require_mesh(obj, error));
     vshi_faces *faces = &obj->faces;
     for (c = skip_blanks(obj, c); !is_over(*c); c = skip_blanks(obj, c), ++size) {
         uint32_t part[VSHI_OBJ_KINDS], vertex = 0;
         VSHI_TRY(read_corner(obj, &c, part, error));
-        VSHI_TRY(vertex_of(obj, part, &vertex, error));
-        VSHI_TRY(vshi_grow(&obj->budget, &faces->corners, &faces->capacity, faces->count + 1,
-                           sizeof *faces->corners, error));
+        VSHI_TRY(find_vertex(obj, part, &vertex, error));
+        VSHI_TRY(VSHI_GROW(&obj->budget, faces->corners, faces->capacity, faces->count + 1, error));
         faces->corners[faces->count++] = vertex;
     }
     *at = c;
@@ -558,20 +549,20 @@ static vsh_result read_face(vshi_obj *obj, const char **at, vsh_error *error) {
 
 typedef vsh_result name_fn(vshi_obj *obj, const char *text, size_t size, vsh_error *error);
 
-static vsh_result read_name(vshi_obj *obj, const char **at, name_fn *take, vsh_error *error) {
+static vsh_result read_name(vshi_obj *obj, const char **at, name_fn *read, vsh_error *error) {
     const char *c = skip_blanks(obj, *at), *end = c;
     while (!is_line_end(*end)) {
         ++end;
     }
     *at = end;
     const vshi_token name = vshi_scan_rest(c, end);
-    return take(obj, name.text, name.size, error);
+    return read(obj, name.text, name.size, error);
 }
 
 static vsh_result read_statement(vshi_obj *obj, const char **at, vsh_error *error) {
     static const struct {
         const char *keyword;
-        name_fn *take;
+        name_fn *read;
     } named[] = {
         {"o", set_object},
         {"g", set_group},
@@ -592,13 +583,13 @@ static vsh_result read_statement(vshi_obj *obj, const char **at, vsh_error *erro
         return read_face(obj, at, error);
     }
     if ((c[0] == 'l' || c[0] == 'p') && ends_token(c[1])) {
-        return need_mesh(obj, error); /* they cast no shadow, but part meshes as faces do */
+        return require_mesh(obj, error); /* they cast no shadow, but split meshes like faces */
     }
-    const vshi_token keyword = token_at(c);
+    const vshi_token keyword = find_token(c);
     for (size_t i = 0; i < sizeof named / sizeof named[0]; ++i) {
         if (vshi_token_is(keyword, named[i].keyword)) {
             *at = c + keyword.size;
-            return read_name(obj, at, named[i].take, error);
+            return read_name(obj, at, named[i].read, error);
         }
     }
     return VSH_OK;
@@ -647,7 +638,7 @@ vsh_result vshi_obj_read(const char *path, const vsh_run *run, vshi_job *job, si
     VSHI_TRY_DONE(read_statements(&obj, error));
     VSHI_TRY_DONE(check_indices(&obj, error));
     vshi_text_free(&obj.text);
-    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(made, 1, path, error));
     VSHI_TRY_DONE(build_model(&obj, made, error));
     *model = made;
     made = NULL;

@@ -1,4 +1,4 @@
-/* MTL, the materials of an OBJ: how much of them is there, and which textures cut them out. */
+/* Reads MTL, the materials of an OBJ: their opacity, and the textures that mask them. */
 #include "base/decimal.h"
 
 #include "base/file.h"
@@ -12,39 +12,30 @@
 #include <sys/stat.h>
 #include <vdbshade/mesh.h>
 
-static bool take_number(const char **at, const char *end, double *value) {
-    const vshi_token token = vshi_scan_token(at, end);
-    float number;
-    if (token.text == NULL || vshi_token_number(token) != VSHI_NUMBER_FINITE ||
-        vshi_decimal_float(token.text, &number) != token.text + token.size || !isfinite(number)) {
-        return false;
-    }
-    *value = (double)number;
-    return true;
+static bool parse_number(vshi_token token, float *number) {
+    return token.text != NULL && vshi_decimal_float(token.text, number) == token.text + token.size &&
+           isfinite(*number);
 }
 
-/* One to three numbers, u v w; but the last word of the line is the file's name, whatever it is. */
-static bool take_numbers(const char **at, const char *end, double values[2]) {
-    if (!take_number(at, end, &values[0])) {
-        return false;
-    }
-    for (int i = 1; i < 3; ++i) {
-        const char *next = *at, *behind;
-        double number;
-        const bool is = take_number(&next, end, &number);
-        behind = next;
-        if (!is || vshi_scan_token(&behind, end).text == NULL) {
-            break;
+/* Reads one to three numbers, u v w. The last word of the line is the file's name, even if it is a number. */
+static bool read_numbers(const char **at, const char *end, double values[2]) {
+    for (int i = 0; i < 3; ++i) {
+        const char *next = *at, *rest;
+        float number;
+        const bool is_number = parse_number(vshi_scan_token(&next, end), &number);
+        rest = next;
+        if (!is_number || (i > 0 && vshi_scan_token(&rest, end).text == NULL)) {
+            return i > 0;
         }
         if (i < 2) {
-            values[i] = number;
+            values[i] = (double)number;
         }
         *at = next;
     }
     return true;
 }
 
-static bool take_channel(vshi_token value, int32_t *channel) {
+static bool read_channel(vshi_token value, int32_t *channel) {
     static const struct {
         const char *word;
         int32_t channel;
@@ -62,12 +53,12 @@ static bool take_channel(vshi_token value, int32_t *channel) {
     return false;
 }
 
-/* The option `word`, whose values follow at *at. */
-static bool take_option(vshi_token word, const char **at, const char *end, vshi_mtl_map *map) {
+/* Reads the option `word`, whose values follow at *at. Returns false if it is unknown or incomplete. */
+static bool read_option(vshi_token word, const char **at, const char *end, vshi_mtl_map *map) {
     static const struct {
         const char *word;
-        int values; /* -1: one to three numbers */
-        bool taken; /* or passed over, without harm */
+        int values;     /* -1: one to three numbers */
+        bool supported; /* or harmless */
     } options[] = {{"-clamp", 1, true},  {"-imfchan", 1, true}, {"-o", -1, true},   {"-s", -1, true},
                    {"-blendu", 1, true}, {"-blendv", 1, true},  {"-cc", 1, true},   {"-texres", 1, true},
                    {"-bm", 1, true},     {"-boost", 1, true},   {"-type", 1, true}, {"-mm", 2, false},
@@ -84,18 +75,18 @@ static bool take_option(vshi_token word, const char **at, const char *end, vshi_
                       : strcmp(options[i].word, "-s") == 0 ? map->scale
                                                            : ignored;
     vshi_token value = {NULL, 0};
-    bool there = options[i].values > 0 || take_numbers(at, end, numbers), taken = options[i].taken;
-    for (int k = 0; k < options[i].values && there; ++k) {
+    bool complete = options[i].values > 0 || read_numbers(at, end, numbers), supported = options[i].supported;
+    for (int k = 0; k < options[i].values && complete; ++k) {
         value = vshi_scan_token(at, end);
-        there = value.text != NULL;
+        complete = value.text != NULL;
     }
     if (vshi_token_is(word, "-clamp")) {
         map->clamp = vshi_token_is(value, "on");
     } else if (vshi_token_is(word, "-imfchan")) {
-        taken = take_channel(value, &map->channel);
+        supported = read_channel(value, &map->channel);
     }
-    map->other = taken ? map->other : word;
-    return there;
+    map->other = supported ? map->other : word;
+    return complete;
 }
 
 static bool is_option(vshi_token word) {
@@ -110,7 +101,7 @@ bool vshi_mtl_map_read(const char *at, const char *end, vshi_mtl_map *map) {
         if (!is_option(word)) {
             break;
         }
-        if (!take_option(word, &next, end, map)) {
+        if (!read_option(word, &next, end, map)) {
             map->other = word;
             return false;
         }
@@ -119,18 +110,6 @@ bool vshi_mtl_map_read(const char *at, const char *end, vshi_mtl_map *map) {
     const vshi_token rest = vshi_scan_rest(at, end);
     map->name = rest.size > 0 ? rest : (vshi_token){NULL, 0};
     return true;
-}
-
-char *vshi_path_beside(const char *path, const char *name, size_t size) {
-    const char *slash = strrchr(path, '/');
-    const size_t folder = slash != NULL ? (size_t)(slash - path) + 1 : 0;
-    char *text = malloc(folder + size + 1);
-    if (text != NULL) {
-        memcpy(text, path, folder);
-        memcpy(text + folder, name, size);
-        text[folder + size] = '\0';
-    }
-    return text;
 }
 
 char *vshi_mtl_map_path(const char *path, vshi_token name) {
@@ -144,8 +123,8 @@ char *vshi_mtl_map_path(const char *path, vshi_token name) {
     return text;
 }
 
-/* `d` is the opacity, Tr what is missing of it. "d -halo 0.5" is less where it is seen from the side. */
-static vsh_result take_opacity(const char *mtl, size_t line, vshi_token keyword, const char *at,
+/* `d` is the opacity, Tr the transparency. "d -halo 0.5" is lower at the silhouette. */
+static vsh_result read_opacity(const char *mtl, size_t line, vshi_token keyword, const char *at,
                                const char *end, double *opacity, vsh_error *error) {
     vshi_token value = vshi_scan_token(&at, end);
     if (vshi_token_is(value, "-halo")) {
@@ -155,7 +134,7 @@ static vsh_result take_opacity(const char *mtl, size_t line, vshi_token keyword,
         return VSH_OK;
     }
     float number;
-    if (vshi_decimal_float(value.text, &number) != value.text + value.size || !isfinite(number)) {
+    if (!parse_number(value, &number)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: line %zu: '%.*s' is '%.*s', expected a finite number",
                          mtl, line, VSHI_TOKEN_ARGS(keyword), VSHI_TOKEN_ARGS(value));
     }
@@ -164,16 +143,17 @@ static vsh_result take_opacity(const char *mtl, size_t line, vshi_token keyword,
     return VSH_OK;
 }
 
-/* What cannot be had of a texture leaves the material as it is without: the mesh is there all the same. */
-static vsh_result take_map(vshi_obj *obj, const char *mtl, size_t line, const char *at, const char *end,
+/* Reads the mask of the current material. A texture that cannot be used gives a warning: the mesh is still
+ * usable. */
+static vsh_result read_map(vshi_obj *obj, const char *mtl, size_t line, const char *at, const char *end,
                            vsh_error *error) {
     enum { LONGEST = 1023 };
     vshi_obj_alpha *alpha = &obj->alphas[obj->material];
     vshi_mtl_map map;
     bool is_new;
     char option[64] = "";
-    const bool good = vshi_mtl_map_read(at, end, &map), taken = map.other.text == NULL;
-    if (!taken) {
+    const bool good = vshi_mtl_map_read(at, end, &map), supported = map.other.text == NULL;
+    if (!supported) {
         snprintf(option, sizeof option, "%.*s", VSHI_TOKEN_ARGS(map.other));
     }
     if (!good) {
@@ -187,13 +167,13 @@ static vsh_result take_map(vshi_obj *obj, const char *mtl, size_t line, const ch
     if (map.name.text == NULL) {
         return VSH_OK;
     }
-    if (!taken) {
+    if (!supported) {
         vshi_warn(obj->run, "%s: line %zu: 'map_d' is read without its option '%s'; apply it to the image",
                   mtl, line, option);
     }
     char *path = vshi_mtl_map_path(mtl, map.name);
     if (path == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", mtl);
+        return vshi_fail_memory(error, mtl);
     }
     vsh_result result = VSH_OK;
     if (strlen(path) > LONGEST || memchr(map.name.text, '\0', map.name.size) != NULL) {
@@ -216,7 +196,7 @@ static vsh_result take_map(vshi_obj *obj, const char *mtl, size_t line, const ch
     return result;
 }
 
-static vsh_result take_line(vshi_obj *obj, const char *mtl, size_t line, const char *at, const char *end,
+static vsh_result read_line(vshi_obj *obj, const char *mtl, size_t line, const char *at, const char *end,
                             vsh_error *error) {
     static const char unnamed[] = "DefaultMaterial";
     const vshi_token keyword = vshi_scan_token(&at, end);
@@ -235,25 +215,25 @@ static vsh_result take_line(vshi_obj *obj, const char *mtl, size_t line, const c
         return VSH_OK;
     }
     if (vshi_token_is(keyword, "map_d")) {
-        return take_map(obj, mtl, line, at, end, error);
+        return read_map(obj, mtl, line, at, end, error);
     }
     return vshi_token_is(keyword, "d") || vshi_token_is(keyword, "Tr")
-               ? take_opacity(mtl, line, keyword, at, end, &obj->alphas[obj->material].opacity, error)
+               ? read_opacity(mtl, line, keyword, at, end, &obj->alphas[obj->material].opacity, error)
                : VSH_OK;
 }
 
-static vsh_result take_lines(vshi_obj *obj, vshi_text *text, vsh_error *error) {
+static vsh_result read_lines(vshi_obj *obj, vshi_text *text, vsh_error *error) {
     const char *at = text->bytes, *stop = at + text->size, *end;
     for (size_t line = 1; at < stop; ++line, at = end + 1) {
         end = memchr(at, '\n', (size_t)(stop - at));
         end = end != NULL ? end : stop;
         VSHI_TRY(vshi_text_poll(text, at, error));
-        VSHI_TRY(take_line(obj, text->path, line, at, end, error));
+        VSHI_TRY(read_line(obj, text->path, line, at, end, error));
     }
     return VSH_OK;
 }
 
-/* Reads one where it is a regular file, which *found tells. */
+/* Reads a library if it is a regular file, which *found tells. */
 static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_error *error) {
     struct stat status;
     *found = stat(path, &status) == 0 && S_ISREG(status.st_mode);
@@ -269,9 +249,9 @@ static vsh_result read_file(vshi_obj *obj, const char *path, bool *found, vsh_er
     vshi_text text;
     vsh_result result = vshi_text_read(&text, path, path, &obj->budget, obj->job, 0, error);
     if (result == VSH_OK) {
-        result = take_lines(obj, &text, error);
+        result = read_lines(obj, &text, error);
     } else if (result == VSH_ERROR_READ) {
-        *found = false; /* as if it were not there */
+        *found = false; /* as if it were missing */
         result = VSH_OK;
     }
     vshi_text_free(&text);
@@ -296,7 +276,7 @@ vsh_result vshi_obj_read_materials(vshi_obj *obj, const char *text, size_t size,
     for (int choice = 0; choice < VSHI_OBJ_LIBRARIES && size > 0 && !found; ++choice) {
         char *path = vshi_obj_library(obj->path, choice, text, size);
         if (path == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", obj->path);
+            return vshi_fail_memory(error, obj->path);
         }
         const vsh_result result = read_file(obj, path, &found, error);
         free(path);

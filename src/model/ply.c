@@ -1,32 +1,31 @@
-/* PLY (G. Turk, "The PLY polygon file format", 1994): vertices, and faces or the strips (element tristrips)
- * of Stanford's scans. */
-#include "table/ply.h"
+/* Reads PLY (G. Turk, "The PLY polygon file format", 1994): vertices, and faces or the strips (element
+ * tristrips) of Stanford's scans. */
 #include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/memory.h"
 #include "model/faces.h"
 #include "model/model.h"
 #include "model/text.h"
+#include "table/table.h"
 
 #include <inttypes.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <strings.h>
 
-/* Meanings of properties. Vertices have numbers, which are below VSHI_PLY_NUMBERS. */
+/* Roles of properties. Roles below ROLE_NUMBERS are numbers of vertices. */
 enum {
-    VSHI_PLY_X,
-    VSHI_PLY_NX = 3,
-    VSHI_PLY_U = 6,
-    VSHI_PLY_NUMBERS = 8,
-    VSHI_PLY_CORNERS = VSHI_PLY_NUMBERS, /* lists */
-    VSHI_PLY_TEXCOORDS,
-    VSHI_PLY_STRIP,
-    VSHI_PLY_NOTHING
+    ROLE_X,
+    ROLE_NX = 3,
+    ROLE_U = 6,
+    ROLE_NUMBERS = 8,
+    ROLE_CORNERS = ROLE_NUMBERS, /* lists */
+    ROLE_TEXCOORDS,
+    ROLE_STRIP,
+    ROLE_NONE
 };
 
-enum { VSHI_PLY_MOST_TEXCOORDS = 8 }; /* of one face that are kept: two for each corner */
+enum { MOST_TEXCOORDS = 8 }; /* values of a face: two for each corner */
 
 typedef struct ply_reader {
     const char *path;
@@ -38,21 +37,19 @@ typedef struct ply_reader {
     int8_t roles[VSHI_PLY_PROPERTIES];
     const vshi_ply_element *element;
     uint64_t row;
-    uint64_t vertices; /* that the header names */
+    uint64_t vertices; /* in the header */
     bool has_normals, has_uvs;
     float *positions, *normals, *uvs;
     size_t position_capacity, normal_capacity, uv_capacity, vertex_count;
     vshi_faces faces;
-    /* of the row that is read */
+    /* the current row */
     const char *at, *end;
-    vsh_error *error;
-    int64_t last[2]; /* indices of the strip, of which `length` have been read */
+    int64_t last[2]; /* indices of the strip, after `length` of them */
     size_t length;
-    float number[VSHI_PLY_NUMBERS];
-    size_t corners; /* of the face; of a strip, triangles' */
-    float texcoord[VSHI_PLY_MOST_TEXCOORDS];
+    float number[ROLE_NUMBERS];
+    size_t corners; /* of the face, or of the strip's triangles */
+    float texcoord[MOST_TEXCOORDS];
     size_t texcoords;
-    vsh_result failed;
 } ply_reader;
 
 /* --- the header */
@@ -62,32 +59,32 @@ static const struct {
     const char *name;
     int role;
 } names[] = {
-    {"x", VSHI_PLY_X},         {"y", VSHI_PLY_X + 1},         {"z", VSHI_PLY_X + 2}, {"nx", VSHI_PLY_NX},
-    {"ny", VSHI_PLY_NX + 1},   {"nz", VSHI_PLY_NX + 2},       {"u", VSHI_PLY_U},     {"v", VSHI_PLY_U + 1},
-    {"s", VSHI_PLY_U},         {"t", VSHI_PLY_U + 1},         {"tx", VSHI_PLY_U},    {"ty", VSHI_PLY_U + 1},
-    {"texture_u", VSHI_PLY_U}, {"texture_v", VSHI_PLY_U + 1},
+    {"x", ROLE_X},         {"y", ROLE_X + 1},         {"z", ROLE_X + 2}, {"nx", ROLE_NX},
+    {"ny", ROLE_NX + 1},   {"nz", ROLE_NX + 2},       {"u", ROLE_U},     {"v", ROLE_U + 1},
+    {"s", ROLE_U},         {"t", ROLE_U + 1},         {"tx", ROLE_U},    {"ty", ROLE_U + 1},
+    {"texture_u", ROLE_U}, {"texture_v", ROLE_U + 1},
 };
 
-static int role_of(const char *element, const vshi_ply_property *property) {
+static int find_role(const char *element, const vshi_ply_property *property) {
     const bool list = property->count_type >= 0;
     if (strcmp(element, "tristrips") == 0) {
-        return VSHI_PLY_STRIP;
+        return ROLE_STRIP;
     }
     if (strcmp(element, "face") == 0 && list) {
         return strcmp(property->name, "vertex_index") == 0 || strcmp(property->name, "vertex_indices") == 0
-                   ? VSHI_PLY_CORNERS
-               : strcmp(property->name, "texcoord") == 0 ? VSHI_PLY_TEXCOORDS
-                                                         : VSHI_PLY_NOTHING;
+                   ? ROLE_CORNERS
+               : strcmp(property->name, "texcoord") == 0 ? ROLE_TEXCOORDS
+                                                         : ROLE_NONE;
     }
     for (size_t i = 0; strcmp(element, "vertex") == 0 && !list && i < sizeof names / sizeof names[0]; ++i) {
         if (strcmp(property->name, names[i].name) == 0) {
             return names[i].role;
         }
     }
-    return VSHI_PLY_NOTHING;
+    return ROLE_NONE;
 }
 
-/* Strips take the place of faces: there can be no others, and nothing but vertices in their rows. */
+/* Strips replace faces, so a file cannot have both. Their rows hold one list of vertices. */
 static vsh_result check_strips(const ply_reader *r, const vshi_ply_element *strips, vsh_error *error) {
     const vshi_ply_property *list = &r->head.property[strips->first];
     bool others = false;
@@ -105,17 +102,17 @@ static vsh_result check_strips(const ply_reader *r, const vshi_ply_element *stri
                      r->path);
 }
 
-static vsh_result describe(ply_reader *r, const vshi_ply_element *element, vsh_error *error) {
+static vsh_result find_roles(ply_reader *r, const vshi_ply_element *element, vsh_error *error) {
     const bool vertex = strcmp(element->name, "vertex") == 0, again = vertex && r->vertices > 0;
     for (int p = element->first; p < element->end; ++p) {
-        const int role = again ? VSHI_PLY_NOTHING : role_of(element->name, &r->head.property[p]);
+        const int role = again ? ROLE_NONE : find_role(element->name, &r->head.property[p]);
         r->roles[p] = (int8_t)role;
-        r->has_normals = r->has_normals || (role >= VSHI_PLY_NX && role < VSHI_PLY_U);
-        r->has_uvs = r->has_uvs || role == VSHI_PLY_U || role == VSHI_PLY_U + 1;
+        r->has_normals = r->has_normals || (role >= ROLE_NX && role < ROLE_U);
+        r->has_uvs = r->has_uvs || role == ROLE_U || role == ROLE_U + 1;
     }
     r->vertices = vertex && !again ? element->count : r->vertices;
     if (r->vertices > UINT32_MAX && r->vertices > r->text.size) {
-        return VSH_OK; /* the file is too short for them, which is found where it ends */
+        return VSH_OK; /* the file is too short for them, so reading it fails */
     }
     return r->vertices > UINT32_MAX
                ? vshi_fail(error, VSH_ERROR_LIMIT, "%s: more than %u vertices", r->path, UINT32_MAX)
@@ -136,25 +133,25 @@ static vsh_result read_header(ply_reader *r, vsh_error *error) {
         r->at = stop + 1;
     }
     for (int e = 0; e < head->elements; ++e) {
-        VSHI_TRY(describe(r, &head->element[e], error));
+        VSHI_TRY(find_roles(r, &head->element[e], error));
     }
     return VSH_OK;
 }
 
 /* --- rows */
 
-/* Keeps the vertex that was read. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-static vsh_result keep_vertex(ply_reader *r, vsh_error *error) {
+/* Adds the vertex of the row. */
+static vsh_result add_vertex(ply_reader *r, vsh_error *error) {
     const size_t v = r->vertex_count, next = v + 1;
     VSHI_TRY(vshi_grow(&r->budget, &r->positions, &r->position_capacity, next, sizeof(float[3]), error));
-    memcpy(r->positions + 3 * v, r->number + VSHI_PLY_X, sizeof(float[3]));
+    memcpy(r->positions + 3 * v, r->number + ROLE_X, sizeof(float[3]));
     if (r->has_normals) {
         VSHI_TRY(vshi_grow(&r->budget, &r->normals, &r->normal_capacity, next, sizeof(float[3]), error));
-        memcpy(r->normals + 3 * v, r->number + VSHI_PLY_NX, sizeof(float[3]));
+        memcpy(r->normals + 3 * v, r->number + ROLE_NX, sizeof(float[3]));
     }
     if (r->has_uvs) {
         VSHI_TRY(vshi_grow(&r->budget, &r->uvs, &r->uv_capacity, next, sizeof(float[2]), error));
-        memcpy(r->uvs + 2 * v, r->number + VSHI_PLY_U, sizeof(float[2]));
+        memcpy(r->uvs + 2 * v, r->number + ROLE_U, sizeof(float[2]));
     }
     ++r->vertex_count;
     return VSH_OK;
@@ -162,71 +159,56 @@ static vsh_result keep_vertex(ply_reader *r, vsh_error *error) {
 
 /* --- parsing rows */
 
-static bool fail(ply_reader *r, vsh_result result) {
-    r->failed = result;
-    return false;
+static vsh_result fail_short(const ply_reader *r, vsh_error *error) {
+    return vshi_ply_fail_short(r->path, r->element, r->row, error);
 }
 
-static bool fail_short(ply_reader *r) {
-    return fail(r, vshi_ply_fail_short(r->path, r->element, r->row, r->error));
+static vsh_result fail_value(const ply_reader *r, vshi_token token, const char *expected, vsh_error *error) {
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s %" PRIu64 " holds '%.*s', expected %s", r->path,
+                     r->element->name, r->row, VSHI_TOKEN_ARGS(token), expected);
 }
 
-static bool fail_value(ply_reader *r, vshi_token token, const char *expected) {
-    return fail(r, vshi_fail(r->error, VSH_ERROR_INPUT, "%s: %s %" PRIu64 " holds '%.*s', expected %s",
-                             r->path, r->element->name, r->row, VSHI_TOKEN_ARGS(token), expected));
-}
-
-static bool push_corner(ply_reader *r, uint32_t corner) {
+static vsh_result push_corner(ply_reader *r, uint32_t corner, vsh_error *error) {
     vshi_faces *faces = &r->faces;
     const size_t at = faces->count + r->corners++;
-    const vsh_result result =
-        vshi_grow(&r->budget, &faces->corners, &faces->capacity, at + 1, sizeof *faces->corners, r->error);
-    if (result != VSH_OK) {
-        return fail(r, result);
-    }
+    VSHI_TRY(VSHI_GROW(&r->budget, faces->corners, faces->capacity, at + 1, error));
     faces->corners[at] = corner;
-    return true;
+    return VSH_OK;
 }
 
-static bool check_index(ply_reader *r, int64_t index) {
-    return index >= 0 && (uint64_t)index < r->vertices
-               ? true
-               : fail(r, vshi_fail(r->error, VSH_ERROR_INPUT,
-                                   "%s: %s %" PRIu64 " uses vertex %" PRId64 ", but there are only %" PRIu64,
-                                   r->path, r->element->name, r->row, index, r->vertices));
-}
-
-/* The next index of a strip; -1 begins another. Every second triangle of a strip runs the other way around;
- * those of fewer than three vertices, by which strips are joined, are left out. */
-static bool push_strip(ply_reader *r, int64_t index) {
-    if (index == -1) {
-        r->length = 0;
-        return true;
-    }
-    if (!check_index(r, index)) {
-        return false;
-    }
+/* Adds the next index of a strip. Every second triangle of a strip runs the other way around. Leaves out
+ * triangles of fewer than three vertices, which join strips. */
+static vsh_result push_strip(ply_reader *r, int64_t index, vsh_error *error) {
     const int64_t a = r->last[0], b = r->last[1];
     r->last[0] = b;
     r->last[1] = index;
     if (r->length++ < 2 || a == b || b == index || a == index) {
-        return true;
+        return VSH_OK;
     }
     const bool odd = r->length % 2 == 0;
-    return push_corner(r, (uint32_t)(odd ? b : a)) && push_corner(r, (uint32_t)(odd ? a : b)) &&
-           push_corner(r, (uint32_t)index);
+    VSHI_TRY(push_corner(r, (uint32_t)(odd ? b : a), error));
+    VSHI_TRY(push_corner(r, (uint32_t)(odd ? a : b), error));
+    return push_corner(r, (uint32_t)index, error);
 }
 
-static bool push_index(ply_reader *r, int role, int64_t index) {
-    return role == VSHI_PLY_STRIP ? push_strip(r, index)
-                                  : check_index(r, index) && push_corner(r, (uint32_t)index);
+static vsh_result push_index(ply_reader *r, int role, int64_t index, vsh_error *error) {
+    if (role == ROLE_STRIP && index == -1) { /* begins another strip */
+        r->length = 0;
+        return VSH_OK;
+    }
+    if (index < 0 || (uint64_t)index >= r->vertices) {
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: %s %" PRIu64 " uses vertex %" PRId64 ", but there are only %" PRIu64, r->path,
+                         r->element->name, r->row, index, r->vertices);
+    }
+    return role == ROLE_STRIP ? push_strip(r, index, error) : push_corner(r, (uint32_t)index, error);
 }
 
 static void push_number(ply_reader *r, int role, float number) {
-    if (role < VSHI_PLY_NUMBERS) {
+    if (role < ROLE_NUMBERS) {
         r->number[role] = number;
-    } else if (role == VSHI_PLY_TEXCOORDS) {
-        if (r->texcoords < VSHI_PLY_MOST_TEXCOORDS) {
+    } else if (role == ROLE_TEXCOORDS) {
+        if (r->texcoords < MOST_TEXCOORDS) {
             r->texcoord[r->texcoords] = number;
         }
         ++r->texcoords;
@@ -235,60 +217,50 @@ static void push_number(ply_reader *r, int role, float number) {
 
 /* --- text */
 
-static bool next_token(ply_reader *r, vshi_token *token) {
-    *token = vshi_scan_token(&r->at, r->end);
-    return token->text != NULL ? true : fail_short(r);
-}
-
-static bool take_text(ply_reader *r, int role) {
-    static const char finite[] = "a finite number";
-    vshi_token token;
-    if (!next_token(r, &token)) {
-        return false;
+static vsh_result read_text_value(ply_reader *r, int role, vsh_error *error) {
+    const vshi_token token = vshi_scan_token(&r->at, r->end);
+    if (token.text == NULL) {
+        return fail_short(r, error);
     }
-    if (role == VSHI_PLY_CORNERS || role == VSHI_PLY_STRIP) {
+    if (role == ROLE_CORNERS || role == ROLE_STRIP) {
         int64_t index;
-        return vshi_token_integer(token, &index) && (index >= 0 || role == VSHI_PLY_STRIP)
-                   ? push_index(r, role, index)
-                   : fail_value(r, token, "an index of a vertex");
+        return vshi_token_integer(token, &index) && (index >= 0 || role == ROLE_STRIP)
+                   ? push_index(r, role, index, error)
+                   : fail_value(r, token, "an index of a vertex", error);
     }
     float number;
-    if (vshi_decimal_float(token.text, &number) != token.text + token.size) {
-        /* no place is there, but other things may be so */
-        if (vshi_token_number(token) != VSHI_NUMBER_NOT_FINITE || role < VSHI_PLY_NX) {
-            return fail_value(r, token, finite);
-        }
-        number = NAN;
-    } else if (role < VSHI_PLY_NX && !isfinite(number)) {
-        return fail_value(r, token, finite);
+    const bool is_number = vshi_decimal_float(token.text, &number) == token.text + token.size;
+    /* "nan" and "inf" are no positions, but may be other values */
+    if (role < ROLE_NX ? !is_number || !isfinite(number)
+                       : !is_number && vshi_token_number(token) != VSHI_NUMBER_NOT_FINITE) {
+        return fail_value(r, token, "a finite number", error);
     }
-    push_number(r, role, number);
-    return true;
+    push_number(r, role, is_number ? number : NAN);
+    return VSH_OK;
 }
 
-static bool take_text_property(ply_reader *r, const vshi_ply_property *property, int role) {
+static vsh_result read_text_property(ply_reader *r, const vshi_ply_property *property, int role,
+                                     vsh_error *error) {
     int64_t values = 1;
     if (property->count_type >= 0) {
-        vshi_token token;
-        if (!next_token(r, &token)) {
-            return false;
+        const vshi_token token = vshi_scan_token(&r->at, r->end);
+        if (token.text == NULL) {
+            return fail_short(r, error);
         }
         if (!vshi_token_integer(token, &values) || values < 0) {
-            return fail_value(r, token, "a list's length");
+            return fail_value(r, token, "a list's length", error);
         }
     }
     for (int64_t i = 0; i < values; ++i) {
-        if (!take_text(r, role)) {
-            return false;
-        }
+        VSHI_TRY(read_text_value(r, role, error));
     }
-    return true;
+    return VSH_OK;
 }
 
 /* --- binary */
 
-/* Indices that are floats (nobody writes them so) are whole, or none. */
-static int64_t index_at(const char *at, int type, bool big_endian) {
+/* Reads an index. One that is a float (no known program writes them) must be whole. */
+static int64_t read_index(const char *at, int type, bool big_endian) {
     if (type < VSHI_PLY_FLOAT) {
         return vshi_bytes_integer(at, 1 << type / 2, type % 2 == 0, big_endian);
     }
@@ -296,54 +268,52 @@ static int64_t index_at(const char *at, int type, bool big_endian) {
     return number >= 0.0F && number <= 16777216.0F && floorf(number) == number ? (int64_t)number : -2;
 }
 
-static bool take_binary_property(ply_reader *r, const vshi_ply_property *property, int role) {
+static vsh_result read_binary_property(ply_reader *r, const vshi_ply_property *property, int role,
+                                       vsh_error *error) {
     const bool big = r->head.big_endian;
     const int size = vshi_ply_size(property->type);
     uint64_t values = 1;
     if (property->count_type >= 0) {
         const int count_size = vshi_ply_size(property->count_type);
         if (r->end - r->at < count_size) {
-            return fail_short(r);
+            return fail_short(r, error);
         }
         values = vshi_bytes_number(r->at, count_size, big);
         r->at += count_size;
     }
     if (values > (uint64_t)(r->end - r->at) / (uint64_t)size) {
-        return fail_short(r);
+        return fail_short(r, error);
     }
     const char *at = r->at;
     r->at += values * (uint64_t)size;
-    for (; role != VSHI_PLY_NOTHING && at < r->at; at += size) {
-        if (role != VSHI_PLY_CORNERS && role != VSHI_PLY_STRIP) {
+    for (; role != ROLE_NONE && at < r->at; at += size) {
+        if (role != ROLE_CORNERS && role != ROLE_STRIP) {
             push_number(r, role, (float)vshi_ply_number(at, property->type, big));
-        } else if (!push_index(r, role, index_at(at, property->type, big))) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* Reads a row into the reader's members, and its corners behind those of `faces`. */
-static vsh_result read_row(ply_reader *r, vsh_error *error) {
-    r->error = error;
-    r->corners = r->texcoords = r->length = 0;
-    for (int p = r->element->first; p < r->element->end; ++p) {
-        const vshi_ply_property *property = &r->head.property[p];
-        if (!(r->head.ascii ? take_text_property(r, property, r->roles[p])
-                            : take_binary_property(r, property, r->roles[p]))) {
-            return r->failed;
+        } else {
+            VSHI_TRY(push_index(r, role, read_index(at, property->type, big), error));
         }
     }
     return VSH_OK;
 }
 
-/* Texture coordinates of a face's corners are those of its vertices: the last face's count. */
-static vsh_result keep_texcoords(ply_reader *r, const uint32_t *corners, vsh_error *error) {
+/* Reads a row into the reader's members, and its corners after those of `faces`. */
+static vsh_result read_row(ply_reader *r, vsh_error *error) {
+    r->corners = r->texcoords = r->length = 0;
+    for (int p = r->element->first; p < r->element->end; ++p) {
+        const vshi_ply_property *property = &r->head.property[p];
+        VSHI_TRY(r->head.ascii ? read_text_property(r, property, r->roles[p], error)
+                               : read_binary_property(r, property, r->roles[p], error));
+    }
+    return VSH_OK;
+}
+
+/* Copies the texture coordinates of a face's corners to its vertices. Later faces overwrite earlier ones. */
+static vsh_result set_texcoords(ply_reader *r, const uint32_t *corners, vsh_error *error) {
     enum { LEAST = 6 };
-    if (r->texcoords < LEAST || r->texcoords > VSHI_PLY_MOST_TEXCOORDS || r->corners < r->texcoords / 2) {
+    if (r->texcoords < LEAST || r->texcoords > MOST_TEXCOORDS || r->corners < r->texcoords / 2) {
         return VSH_OK;
     }
-    if (r->uvs == NULL && r->vertices <= r->text.size) { /* else the file is too short for them */
+    if (r->uvs == NULL && r->vertices <= r->text.size) { /* otherwise the file is too short for them */
         VSHI_TRY(
             vshi_reserve(&r->budget, &r->uvs, &r->uv_capacity, (size_t)r->vertices, sizeof(float[2]), error));
         memset(r->uvs, 0, r->uv_capacity * sizeof(float[2]));
@@ -354,30 +324,30 @@ static vsh_result keep_texcoords(ply_reader *r, const uint32_t *corners, vsh_err
     return VSH_OK;
 }
 
-static vsh_result keep_row(ply_reader *r, int role, vsh_error *error) {
+static vsh_result add_row(ply_reader *r, int role, vsh_error *error) {
     vshi_faces *faces = &r->faces;
     const uint32_t *corners = faces->corners != NULL ? faces->corners + faces->count : NULL;
-    if (role < VSHI_PLY_NUMBERS) {
-        return keep_vertex(r, error);
+    if (role < ROLE_NUMBERS) {
+        return add_vertex(r, error);
     }
-    if (role == VSHI_PLY_STRIP) {
+    if (role == ROLE_STRIP) {
         for (size_t i = 0; i < r->corners; i += 3) {
             faces->count += 3;
             VSHI_TRY(vshi_faces_end_face(faces, &r->budget, 0, 3, error));
         }
         return VSH_OK;
     }
-    if (role == VSHI_PLY_NOTHING) {
+    if (role == ROLE_NONE) {
         return VSH_OK;
     }
-    VSHI_TRY(keep_texcoords(r, corners, error));
+    VSHI_TRY(set_texcoords(r, corners, error));
     faces->count += r->corners;
     return vshi_faces_end_face(faces, &r->budget, 0, r->corners, error);
 }
 
-/* What an element's rows are: of vertices, faces or strips, or of nothing that is kept. */
-static int role_of_rows(const ply_reader *r) {
-    int role = VSHI_PLY_NOTHING;
+/* Finds the role of an element's rows: the first of their roles. */
+static int find_row_role(const ply_reader *r) {
+    int role = ROLE_NONE;
     for (int p = r->element->first; p < r->element->end; ++p) {
         role = r->roles[p] < role ? r->roles[p] : role;
     }
@@ -385,23 +355,22 @@ static int role_of_rows(const ply_reader *r) {
 }
 
 static vsh_result read_element(ply_reader *r, vsh_error *error) {
-    const int role = role_of_rows(r);
+    const int role = find_row_role(r);
     memset(r->number, 0, sizeof r->number);
     for (r->row = 0; r->row < r->element->count; ++r->row) {
         VSHI_TRY(vshi_text_poll(&r->text, r->at, error));
         VSHI_TRY(read_row(r, error));
-        VSHI_TRY(keep_row(r, role, error));
+        VSHI_TRY(add_row(r, role, error));
     }
     return VSH_OK;
 }
 
-/* --- what it becomes */
+/* --- the model */
 
 static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_error *error) {
     bool plain;
-    size_t capacity = 0;
     vshi_faces *faces = &r->faces;
-    const size_t most = vshi_faces_most(faces->runs, faces->run_count, &plain);
+    const size_t most = vshi_faces_count_triangles(faces->runs, faces->run_count, &plain);
     if (plain || most == 0) {
         shape->indices = faces->corners;
         shape->triangle_count = most;
@@ -409,7 +378,7 @@ static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_err
         return VSH_OK;
     }
     vshi_face_cutter cutter = {.positions = shape->positions, .job = r->job};
-    VSHI_TRY(vshi_reserve(&r->budget, &shape->indices, &capacity, most, sizeof(uint32_t[3]), error));
+    VSHI_TRY(vshi_reserve(&r->budget, &shape->indices, &(size_t){0}, most, sizeof(uint32_t[3]), error));
     const vsh_result result = vshi_faces_cut(&cutter, faces->runs, faces->run_count, faces->corners,
                                              shape->indices, &shape->triangle_count, error);
     vshi_face_cutter_end(&cutter, r->run, r->path, "");
@@ -417,13 +386,11 @@ static vsh_result make_triangles(ply_reader *r, vshi_model_shape *shape, vsh_err
 }
 
 static vsh_result build(ply_reader *r, vsh_model *model, vsh_error *error) {
-    static const double world[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    size_t capacity = 0;
-    if (r->vertex_count != r->vertices) { /* faces have been checked against the header's number */
+    if (r->vertex_count != r->vertices) { /* faces may use all vertices of the header */
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: its vertices have no x, y or z", r->path);
     }
     VSHI_TRY(vshi_model_check_positions(r->path, "", r->positions, r->vertex_count, error));
-    VSHI_TRY(vshi_reserve(&r->budget, &model->shapes, &capacity, 1, sizeof *model->shapes, error));
+    VSHI_TRY(VSHI_RESERVE(&r->budget, model->shapes, 1, error));
     vshi_model_shape *shape = model->shapes;
     *shape = (vshi_model_shape){.positions = r->positions,
                                 .normals = r->normals,
@@ -435,9 +402,8 @@ static vsh_result build(ply_reader *r, vsh_model *model, vsh_error *error) {
     model->shape_count = 1;
     vshi_model_check_normals(r->path, r->run, "mesh ''", shape);
     VSHI_TRY(make_triangles(r, shape, error));
-    const vshi_model_place place = {"", "", 1, 0, world, {0, 0, 0, 0}};
-    return shape->triangle_count > 0 ? vshi_model_add(model, r->path, r->run, &place, error)
-                                     : vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", r->path);
+    const vshi_model_place place = {"", "", 1, 0, vshi_identity, {0, 0, 0, 0}};
+    return shape->triangle_count > 0 ? vshi_model_add(model, r->path, r->run, &place, error) : VSH_OK;
 }
 
 vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, size_t units, vsh_model **model,
@@ -453,7 +419,7 @@ vsh_result vshi_ply_read(const char *path, const vsh_run *run, vshi_job *job, si
     }
     VSHI_TRY_DONE(vshi_text_poll(&r.text, r.end, error));
     vshi_text_free(&r.text);
-    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, path, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(made, 1, path, error));
     VSHI_TRY_DONE(build(&r, made, error));
     *model = made;
     made = NULL;

@@ -23,7 +23,7 @@ vsh_result vshi_reserve(vshi_budget *budget, void *memory, size_t *capacity, siz
                          "%s: %zu × %zu bytes are more than this machine can address", budget->path, needed,
                          size);
     }
-    /* while it moves there are two of it */
+    /* realloc() may keep the old array while it copies */
     VSHI_TRY(vshi_check_limit(budget->run, budget->bytes + (double)bytes, budget->path, error));
     memcpy(&array, memory, sizeof array);
     array = realloc(array, bytes);
@@ -46,7 +46,7 @@ vsh_result vshi_grow(vshi_budget *budget, void *memory, size_t *capacity, size_t
 
 vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char *name, size_t size,
                              size_t *number, bool *is_new, vsh_error *error) {
-    enum { LONGEST = 1023, NODE = 192 /* bytes that Jansson takes for a member and its number, at most */ };
+    enum { LONGEST = 1023, NODE = 192 /* bytes of a member and its number in Jansson, at most */ };
     char text[LONGEST + 1];
     size = size > 0 ? strnlen(name, size < LONGEST ? size : LONGEST) : 0;
     memcpy(text, size > 0 ? name : "", size);
@@ -60,11 +60,10 @@ vsh_result vshi_words_number(vshi_words *words, vshi_budget *budget, const char 
     words->used += size + 1;
     budget->bytes += (double)(size + NODE);
     VSHI_TRY(vshi_check_limit(budget->run, budget->bytes, budget->path, error));
-    VSHI_TRY(
-        vshi_grow(budget, &words->names, &words->capacity, words->count + 1, sizeof *words->names, error));
+    VSHI_TRY(VSHI_GROW(budget, words->names, words->capacity, words->count + 1, error));
     words->numbers = words->numbers != NULL ? words->numbers : json_object();
     if (json_object_set_new_nocheck(words->numbers, text, json_integer((json_int_t)words->count)) != 0) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", budget->path);
+        return vshi_fail_memory(error, budget->path);
     }
     words->names[words->count++] = json_object_iter_key(json_object_iter_at(words->numbers, text));
     return VSH_OK;
@@ -99,6 +98,16 @@ done:
     return result;
 }
 
+vsh_result vshi_text_read_whole(vshi_text *text, vshi_budget *budget, vshi_job *job, size_t units,
+                                vsh_error *error) {
+    /* Peak bytes for a byte of the file: text, structures of Assimp or Jansson, and our arrays. Measured on a
+     * million triangles: GLB 4.2, STL 3.4. Some files unfold further (compressed FBX, many faces of few
+     * vertices), so assimp.c checks the scene's size again before it copies it. */
+    static const double peak = 6.0;
+    VSHI_TRY(vshi_text_read(text, budget->path, budget->path, budget, job, units, error));
+    return vshi_check_limit(budget->run, peak * (double)text->size, budget->path, error);
+}
+
 void vshi_text_free(vshi_text *text) {
     free(text->bytes);
     if (text->budget != NULL) {
@@ -117,7 +126,7 @@ vsh_result vshi_text_poll(vshi_text *text, const char *at, vsh_error *error) {
     const size_t more = reached > text->units_done ? reached - text->units_done : 0;
     text->next_poll = at + PIECE;
     text->units_done += more;
-    return vshi_job_advance(text->job, more) ? vshi_job_fail_cancelled(text->job, error) : VSH_OK;
+    return vshi_job_step(text->job, more, error);
 }
 
 /* --- tokens */
@@ -162,13 +171,13 @@ vshi_number vshi_token_number(vshi_token token) {
     double ignored;
     c += *c == '-' || *c == '+';
     if (end - c >= 3 && (strncasecmp(c, "nan", 3) == 0 || strncasecmp(c, "inf", 3) == 0)) {
-        return VSHI_NUMBER_NOT_FINITE; /* "-nan(ind)", too */
+        return VSHI_NUMBER_NOT_FINITE; /* also "-nan(ind)" */
     }
     return vshi_decimal_read(token.text, end, &ignored) ? VSHI_NUMBER_FINITE : VSHI_NUMBER_NONE;
 }
 
 bool vshi_token_integer(vshi_token token, int64_t *value) {
-    enum { DIGITS = 18 }; /* any so many digits fit int64_t */
+    enum { DIGITS = 18 }; /* always fit int64_t */
     const size_t sign = token.size > 0 && (*token.text == '-' || *token.text == '+') ? 1 : 0;
     *value = 0;
     for (size_t i = sign; i < token.size; ++i) {

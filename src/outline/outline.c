@@ -10,7 +10,7 @@
 #include <string.h>
 
 static const size_t MAX_POINTS = (size_t)1 << 31;
-/* Bytes that an outline takes while it is made, for each of its points: points, tree, and what is cut. */
+/* Peak bytes of an outline for each of its points: points, tree, and cuts. */
 static const double BYTES_PER_POINT = 96.0;
 
 /* --- contours */
@@ -29,30 +29,17 @@ static bool fails(vshi_contours *c, vsh_result result) {
 }
 
 /* Makes room for one more element of an array. The memory limit counts `bytes` for each element. Returns
- * false, and sets contours->result, where there is no room. */
-static bool make_room(vshi_contours *c, void *array, size_t size, size_t count, size_t *capacity,
+ * false, and sets contours->result, if there is no room. */
+static bool make_room(vshi_contours *c, void **array, size_t size, size_t count, size_t *capacity,
                       double bytes) {
     if (count < *capacity) {
         return true;
     }
-    const size_t grown = *capacity == 0 ? 1024 : 2 * *capacity;
-    if (grown > 2 * MAX_POINTS) {
-        fails(c, vshi_fail(c->error, VSH_ERROR_LIMIT, "outline: more than %zu points", MAX_POINTS));
-        return false;
+    if (*capacity > MAX_POINTS) {
+        return !fails(c, vshi_fail(c->error, VSH_ERROR_LIMIT, "outline: more than %zu points", MAX_POINTS));
     }
-    if (fails(c, vshi_check_limit(c->run, bytes * (double)grown, "outline", c->error))) {
-        return false;
-    }
-    void **place = array;
-    void *memory = realloc(*place, grown * size);
-    if (memory == NULL) {
-        fails(c,
-              vshi_fail(c->error, VSH_ERROR_MEMORY, "outline: the system refused %zu bytes", grown * size));
-        return false;
-    }
-    *place = memory;
-    *capacity = grown;
-    return true;
+    return !fails(c, vshi_check_limit(c->run, bytes * 2.0 * (double)*capacity, "outline", c->error)) &&
+           !fails(c, vshi_make_room(array, count, capacity, size, "outline", c->error));
 }
 
 static size_t contour_begin(const vshi_contours *c) {
@@ -60,8 +47,8 @@ static size_t contour_begin(const vshi_contours *c) {
 }
 
 void vshi_contours_add(vshi_contours *c, double x, double y) {
-    if (c->result != VSH_OK ||
-        !make_room(c, &c->points, sizeof *c->points, c->point_count, &c->point_capacity, BYTES_PER_POINT)) {
+    if (c->result != VSH_OK || !make_room(c, (void **)&c->points, sizeof *c->points, c->point_count,
+                                          &c->point_capacity, BYTES_PER_POINT)) {
         return;
     }
     if (!(fabs(x) <= VSHI_OUTLINE_LARGEST && fabs(y) <= VSHI_OUTLINE_LARGEST)) {
@@ -93,7 +80,8 @@ void vshi_contours_close(vshi_contours *c) {
     if (!closed) {
         vshi_contours_add(c, start.x, start.y);
     }
-    if (c->result != VSH_OK || !make_room(c, &c->starts, sizeof *c->starts, c->contour_count + 1,
+    const size_t starts = c->contour_count > 0 ? c->contour_count + 1 : 0;
+    if (c->result != VSH_OK || !make_room(c, (void **)&c->starts, sizeof *c->starts, starts,
                                           &c->contour_capacity, BYTES_PER_POINT)) {
         return;
     }
@@ -108,7 +96,7 @@ enum { LEAF_SEGMENTS = 4 };
 
 /* --- growing a tree */
 
-/* A contour while the tree above the contours is made. */
+/* A contour while the tree above the contours is built. */
 typedef struct item {
     double middle[2];
     uint32_t contour;
@@ -178,7 +166,7 @@ static void grow_space(vsh_outline *o, size_t index, item *items, size_t count) 
     join_children(o, node);
 }
 
-/* Makes the tree; `outline` holds points and starts. */
+/* Builds the tree over points and starts. */
 static vsh_result grow_tree(vsh_outline *o, vsh_error *error) {
     size_t leaves = 0;
     for (size_t c = 0; c < o->contour_count; ++c) {
@@ -200,7 +188,7 @@ static vsh_result grow_tree(vsh_outline *o, vsh_error *error) {
     return VSH_OK;
 }
 
-/* --- asking a tree */
+/* --- queries */
 
 static double box_square(const vshi_outline_node *node, vshi_point p) {
     const double x = fmax(fmax(node->low[0] - p.x, p.x - node->high[0]), 0.0);
@@ -250,7 +238,7 @@ double vshi_outline_square(const vsh_outline *o, vshi_point p, double bound) {
     return best;
 }
 
-/* Adds how a way from a to b, right of a point at height y, winds around the point: the half-open rule. */
+/* The winding of a way from a to b around a point at height y to its left, by the half-open rule. */
 static int64_t count_crossing(vshi_point a, vshi_point b, double y) {
     return (a.y <= y && b.y > y) - (a.y > y && b.y <= y);
 }
@@ -265,8 +253,7 @@ int64_t vshi_outline_winding(const vsh_outline *o, vshi_point p) {
         if (p.y < node->low[1] || p.y >= node->high[1] || p.x >= node->high[0]) {
             continue;
         }
-        if (p.x <
-            node->low[0]) { /* all of it to the right: whole contours add nothing, chains by their ends */
+        if (p.x < node->low[0]) { /* all to the right: whole contours add nothing, chains by their ends */
             winding += node->count == 0 ? 0
                                         : count_crossing(o->points[node->first],
                                                          o->points[node->first + node->count], p.y);
@@ -289,15 +276,15 @@ int64_t vshi_outline_winding(const vsh_outline *o, vshi_point p) {
     return winding;
 }
 
-/* --- the border of the filled area: contours are cut where they cross. Parts with one side inside are kept
+/* --- the border of the filled area: contours are cut where they cross. Pieces with one side inside are kept
  * and joined again. Time is quadratic at worst, and near-linear if few contours cross, as in letters. */
 
-/* Distance from a piece's middle to the points that test its sides: a share of the piece's length, and of the
- * outline's size, below which rounding would decide. */
+/* Distance from a piece's middle to the test points on its sides: shares of the piece's length and, against
+ * rounding, of the outline's size. */
 static const double SIDE_OF_LENGTH = 1e-4;
 static const double SIDE_OF_SIZE = 1e-13;
 
-/* A cut of a segment: where, and how far along it. */
+/* A cut of a segment. */
 typedef struct cut {
     uint32_t segment;
     double along;
@@ -338,7 +325,8 @@ static bool add_cut(work *w, uint32_t segment, vshi_point point) {
     if (same(point, a) || same(point, b)) {
         return true;
     }
-    if (!make_room(w->result, &w->cuts, sizeof *w->cuts, w->cut_count, &w->cut_capacity, sizeof *w->cuts)) {
+    if (!make_room(w->result, (void **)&w->cuts, sizeof *w->cuts, w->cut_count, &w->cut_capacity,
+                   sizeof *w->cuts)) {
         return false;
     }
     const double along = (point.x - a.x) * (b.x - a.x) + (point.y - a.y) * (b.y - a.y);
@@ -346,12 +334,12 @@ static bool add_cut(work *w, uint32_t segment, vshi_point point) {
     return true;
 }
 
-/* Whether p, on the line of a segment, lies between its ends. */
+/* Whether a point on a segment's line lies between its ends. */
 static bool between(vshi_point a, vshi_point b, vshi_point p) {
     return p.x >= fmin(a.x, b.x) && p.x <= fmax(a.x, b.x) && p.y >= fmin(a.y, b.y) && p.y <= fmax(a.y, b.y);
 }
 
-/* Where two segments cross: the same bits whatever their order and sense, so that contours that lie on each
+/* The crossing of two segments. Their order and sense do not change its bits, so contours on top of each
  * other are cut alike. */
 static vshi_point meet(vshi_point a, vshi_point b, vshi_point c, vshi_point d) {
     const bool ab = compare(a, b) < 0, cd = compare(c, d) < 0;
@@ -381,7 +369,7 @@ static bool cut_pair(work *w, uint32_t i, uint32_t k) {
     return going && (td != 0.0 || !between(a, b, d) || add_cut(w, i, d));
 }
 
-/* Cuts segment i with those of higher numbers. */
+/* Cuts segment i with segments of higher numbers. */
 static bool cut_segment(work *w, uint32_t i) {
     const vsh_outline *o = w->outline;
     const vshi_point a = o->points[i], b = o->points[i + 1];
@@ -417,7 +405,7 @@ static int by_place(const void *a, const void *b) {
     return (p->along > q->along) - (p->along < q->along);
 }
 
-/* Keeps a piece where one of its sides is inside, the inside to its left. */
+/* Keeps a piece if just one of its sides is inside, and turns it so that the inside is on its left. */
 static bool add_piece(work *w, vshi_point a, vshi_point b) {
     const double dx = b.x - a.x, dy = b.y - a.y, length = vshi_hypot(dx, dy);
     if (!(length > 0.0)) {
@@ -435,7 +423,7 @@ static bool add_piece(work *w, vshi_point a, vshi_point b) {
     if (in_left == in_right) {
         return true;
     }
-    if (!make_room(w->result, &w->pieces, sizeof *w->pieces, w->piece_count, &w->piece_capacity,
+    if (!make_room(w->result, (void **)&w->pieces, sizeof *w->pieces, w->piece_count, &w->piece_capacity,
                    sizeof *w->pieces)) {
         return false;
     }
@@ -479,7 +467,7 @@ static int by_ends(const void *a, const void *b) {
     return order != 0 ? order : compare(p->to, q->to);
 }
 
-/* The first unused piece that begins at a point; NULL where there is none. */
+/* Finds the first unused piece that begins at a point; NULL if there is none. */
 static piece *find(const work *w, vshi_point from) {
     size_t low = 0, high = w->piece_count;
     while (low < high) {
@@ -502,7 +490,7 @@ static bool join(work *w) {
     if (w->piece_count > 0) {
         qsort(w->pieces, w->piece_count, sizeof *w->pieces, by_ends);
     }
-    for (size_t i = 1; i < w->piece_count; ++i) { /* contours that share a line have it twice */
+    for (size_t i = 1; i < w->piece_count; ++i) { /* contours that share a line have duplicates */
         w->pieces[i].used =
             same(w->pieces[i].from, w->pieces[i - 1].from) && same(w->pieces[i].to, w->pieces[i - 1].to);
     }
@@ -528,9 +516,9 @@ static bool join(work *w) {
     return true;
 }
 
-/* Cuts contours where they cross and keeps what has the area on one side only, area to the left, into
- * `result`. `outline` holds them, with its tree. False where rounding leaves ends that fit nothing: contours
- * that touch along lines that are nearly the same; `result` is then of no use. */
+/* Cuts the contours of `outline` where they cross, and adds the borders of the area to `result`, with the
+ * area on their left. Returns false, with a useless result, if rounding leaves ends that fit nothing: some
+ * contours touch along nearly the same line. */
 static bool resolve_contours(const vsh_outline *outline, vshi_contours *result) {
     work w = {.outline = outline, .result = result};
     const bool fits = cut_all(&w) && join(&w);
@@ -541,7 +529,7 @@ static bool resolve_contours(const vsh_outline *outline, vshi_contours *result) 
 
 /* --- outlines */
 
-/* Twice the area, measured from the contour's first point so that little is lost far from the origin. */
+/* Twice the area, measured from the contour's first point to lose little far from the origin. */
 static double contour_area(const vshi_point *points, size_t count) {
     double sum = 0.0;
     for (size_t i = 1; i + 1 < count; ++i) {
@@ -559,7 +547,7 @@ static double area_of(const vsh_outline *o) {
     return 0.5 * sum;
 }
 
-/* The area to the left of every contour, where the contours agree in it. */
+/* Reverses all contours if that puts the area on their left. */
 static void orient(vsh_outline *o) {
     o->area = area_of(o);
     if (o->area >= 0.0) {
@@ -575,7 +563,8 @@ static void orient(vsh_outline *o) {
     }
 }
 
-/* Takes the contours over, and plants the tree; *outline stays NULL where there are none. */
+/* Makes an outline that owns the contours' arrays, and its tree. *outline stays NULL if there are no
+ * contours. */
 static vsh_result make(vshi_contours *c, vsh_outline **outline) {
     vsh_outline *made = NULL;
     vsh_result result;
@@ -599,8 +588,7 @@ done:
     return result;
 }
 
-/* Puts an outline whose contours neither cross nor overlap in the place of one, unless rounding left no such.
- */
+/* Replaces an outline by one whose contours neither cross nor overlap, unless rounding prevents it. */
 static vsh_result resolve(vshi_contours *c, vsh_outline **outline) {
     vshi_contours resolved = {.run = c->run, .error = c->error};
     const bool fits = resolve_contours(*outline, &resolved);
@@ -656,13 +644,13 @@ vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts,
     return vshi_contours_finish(&contours, false, "polygons", outline);
 }
 
-vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t instance_count, const vsh_run *run,
-                             vsh_outline **outline, vsh_error *error) {
+vsh_result vshi_outline_unite(const vshi_outline_instance *instances, size_t instance_count,
+                              const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(outline);
     *outline = NULL;
     if (instances == NULL || instance_count == 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_unite: no instances");
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_outline_unite: no instances");
     }
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
@@ -674,11 +662,11 @@ vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t insta
         const double determinant = m[0] * m[4] - m[1] * m[3];
         if (o == NULL || !isfinite(determinant) || determinant == 0.0 || !isfinite(m[2]) || !isfinite(m[5])) {
             vshi_contours_free(&contours);
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_outline_unite: instance %zu: %s", i,
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_outline_unite: instance %zu: %s", i,
                              o == NULL ? "no outline" : "a transform that flattens or is not finite");
         }
         for (size_t c = 0; c < o->contour_count; ++c) {
-            /* a mirrored contour runs backwards, so that what it bounds winds the same way as the others */
+            /* a mirrored contour is reversed, so that its area winds the same way as the others */
             const size_t begin = o->starts[c], end = o->starts[c + 1] - 1;
             for (size_t k = begin; k < end; ++k) {
                 const vshi_point p = o->points[determinant > 0.0 ? k : end - (k - begin)];
@@ -690,13 +678,13 @@ vsh_result vsh_outline_unite(const vsh_outline_instance *instances, size_t insta
     return vshi_contours_finish(&contours, instance_count == 1, "outlines", outline);
 }
 
-void vsh_outline_get_info(const vsh_outline *o, vsh_outline_info *info) {
+void vshi_outline_get_info(const vsh_outline *o, vshi_outline_info *info) {
     const size_t points = o->starts[o->contour_count];
-    vsh_outline_info found = {.contours = o->contour_count,
-                              .points = points - o->contour_count,
-                              .area = o->area,
-                              .bytes = points * sizeof *o->points + o->node_count * sizeof *o->nodes +
-                                       (o->contour_count + 1) * sizeof *o->starts + sizeof *o};
+    vshi_outline_info found = {.contours = o->contour_count,
+                               .points = points - o->contour_count,
+                               .area = o->area,
+                               .bytes = points * sizeof *o->points + o->node_count * sizeof *o->nodes +
+                                        (o->contour_count + 1) * sizeof *o->starts + sizeof *o};
     memcpy(found.bounds_min, o->nodes[0].low, sizeof found.bounds_min);
     memcpy(found.bounds_max, o->nodes[0].high, sizeof found.bounds_max);
     *info = found;
@@ -704,13 +692,13 @@ void vsh_outline_get_info(const vsh_outline *o, vsh_outline_info *info) {
 
 _Static_assert(sizeof(vshi_point) == 2 * sizeof(double), "points are handed out as pairs of doubles");
 
-const double *vsh_outline_contour(const vsh_outline *o, size_t index, size_t *count) {
+const double *vshi_outline_contour(const vsh_outline *o, size_t index, size_t *count) {
     const bool there = index < o->contour_count;
     *count = there ? o->starts[index + 1] - o->starts[index] - 1 : 0;
     return there ? &o->points[o->starts[index]].x : NULL;
 }
 
-double vsh_outline_distance(const vsh_outline *o, const double point[2]) {
+double vshi_outline_distance(const vsh_outline *o, const double point[2]) {
     VSHI_FLOATS;
     const vshi_point p = {point[0], point[1]};
     if (!isfinite(p.x) || !isfinite(p.y)) {

@@ -1,12 +1,12 @@
-/* The border of what is solid in an image: marching squares over the pixels' centres.
+/* The outline of an image's solid area: marching squares over the pixels' centres.
  *
- * Around the pixels stand two rings of samples on the image's edge: the inner one repeats the pixels next to
- * it, the outer one is not solid. So an area that reaches the edge is closed there, at its right place. */
+ * Two rings of samples on the image's edge surround the pixels. The inner ring repeats the pixels next to it,
+ * the outer ring is not solid. So an area that reaches the edge is closed there, at its right place. */
 #include "outline/outline.h"
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "image/planes.h"
+#include "image/image.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -26,15 +26,15 @@ static bool varies(const float *plane, size_t count) {
     return false;
 }
 
-/* A colour by its name, of a grey image the grey. */
-static const float *colour(const vsh_image *image, const char *name) {
+/* Finds a colour by its name; in a grey image the grey. */
+static const float *find_colour(const vsh_image *image, const char *name) {
     const float *plane = vshi_image_find_plane(image, name);
     return plane != NULL ? plane : vshi_image_find_plane(image, "Y");
 }
 
-static vsh_result take_luminance(const vsh_image *image, const char *path, const vsh_run *run,
+static vsh_result find_luminance(const vsh_image *image, const char *path, const vsh_run *run,
                                  const float **plane, float **owned, vsh_error *error) {
-    const float *rgb[3] = {colour(image, "R"), colour(image, "G"), colour(image, "B")};
+    const float *rgb[3] = {find_colour(image, "R"), find_colour(image, "G"), find_colour(image, "B")};
     if (rgb[0] == NULL || rgb[1] == NULL || rgb[2] == NULL) {
         if (image->channel_count != 1) {
             return vshi_fail(error, VSH_ERROR_INPUT,
@@ -57,8 +57,8 @@ static vsh_result take_luminance(const vsh_image *image, const char *path, const
     return VSH_OK;
 }
 
-/* "alpha" is what files call A, and so on. */
-static const char *own_name(const char *channel) {
+/* The name in files: A for "alpha", and so on. */
+static const char *file_name(const char *channel) {
     static const char *const names[][2] = {{"alpha", "A"}, {"red", "R"}, {"green", "G"}, {"blue", "B"}};
     for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
         if (strcmp(channel, names[i][0]) == 0) {
@@ -68,7 +68,7 @@ static const char *own_name(const char *channel) {
     return channel;
 }
 
-static vsh_result take_channel(const vsh_image *image, const char *path, const char *channel,
+static vsh_result find_channel(const vsh_image *image, const char *path, const char *channel,
                                const vsh_run *run, const float **plane, float **owned, vsh_error *error) {
     const size_t count = (size_t)image->width * (size_t)image->height;
     *plane = NULL;
@@ -80,7 +80,7 @@ static vsh_result take_channel(const vsh_image *image, const char *path, const c
         }
     } else if (strcmp(channel, "luminance") != 0) {
         *plane = vshi_image_find_plane(image, channel);
-        *plane = *plane != NULL ? *plane : vshi_image_find_plane(image, own_name(channel));
+        *plane = *plane != NULL ? *plane : vshi_image_find_plane(image, file_name(channel));
         if (*plane != NULL) {
             return VSH_OK;
         }
@@ -92,13 +92,13 @@ static vsh_result take_channel(const vsh_image *image, const char *path, const c
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: has no channel '%.64s'; it has %s", path, channel,
                          known);
     }
-    return take_luminance(image, path, run, plane, owned, error);
+    return find_luminance(image, path, run, plane, owned, error);
 }
 
 /* --- the border */
 
-/* An edge between two samples that the border crosses, and the one it goes to next. Edges are numbered: twice
- * the number of their upper or left sample, 1 more where they go down. */
+/* A step of the border from one edge between samples to the next. An edge's number is twice that of its upper
+ * or left sample, plus 1 if it goes down. */
 typedef struct step {
     uint64_t from, to;
     bool used;
@@ -131,7 +131,7 @@ static bool solid(const border *b, int64_t i, int64_t k) {
     return (sample(b, i, k) >= b->threshold) != b->invert;
 }
 
-/* In pixels from the image's upper left corner. */
+/* Position of a sample, pixels from the image's upper left corner. */
 static double place(int64_t i, int64_t size) {
     return i <= 1 ? 0.0 : i >= size + 2 ? (double)size : (double)i - 1.5;
 }
@@ -155,8 +155,8 @@ static void add_step(border *b, uint64_t from, uint64_t to) {
     b->step_count++;
 }
 
-/* Going around the cell, an edge where the solid begins is joined with the one where it ends. Where there are
- * two of each, the cell's middle tells whether its solid corners are one. */
+/* Goes around a cell, and joins an edge where the solid begins with one where it ends. If there are two of
+ * each, the cell's middle decides whether its solid corners are connected. */
 static void march_cell(border *b, int64_t i, int64_t k) {
     const bool corner[5] = {solid(b, i, k), solid(b, i + 1, k), solid(b, i + 1, k + 1), solid(b, i, k + 1),
                             solid(b, i, k)};
@@ -164,7 +164,7 @@ static void march_cell(border *b, int64_t i, int64_t k) {
     const uint64_t edges[4] = {2 * at, 2 * (at + 1) + 1, 2 * (at + columns), 2 * at + 1};
     uint64_t begins[2] = {0, 0}, ends[2] = {0, 0};
     size_t begin_count = 0, end_count = 0;
-    int first = -1; /* the first edge that is crossed, when it is an end */
+    int first = -1; /* the first crossed edge, if it is an end */
     for (int e = 0; e < 4; ++e) {
         if (corner[e] == corner[e + 1]) {
             continue;
@@ -182,7 +182,7 @@ static void march_cell(border *b, int64_t i, int64_t k) {
         const double middle =
             0.25 * (sample(b, i, k) + sample(b, i + 1, k) + sample(b, i + 1, k + 1) + sample(b, i, k + 1));
         const bool joined = (middle >= b->threshold) != b->invert;
-        /* ends[j] follows begins[j] where the first crossing is a begin, else begins[1 - j] */
+        /* ends[j] follows begins[j] if the first crossing is a begin, else begins[1 - j] */
         const int shift = (first >= 0) != joined;
         add_step(b, begins[0], ends[shift]);
         add_step(b, begins[1], ends[1 - shift]);
@@ -207,7 +207,7 @@ static int by_from(const void *a, const void *b) {
     return (p->from > q->from) - (p->from < q->from);
 }
 
-/* Each edge that is crossed begins one step and ends one. */
+/* Each crossed edge begins one step and ends one. */
 static step *find_step(const border *b, uint64_t from) {
     return bsearch(&(step){.from = from}, b->steps, b->step_count, sizeof *b->steps, by_from);
 }
@@ -253,7 +253,7 @@ static vsh_result trace_image(const vsh_image *image, const char *path, const vs
     const double held = 4.0 * (double)count * (image->channel_count + 1.0);
     vsh_result result;
     VSHI_TRY(vshi_check_limit(run, held, path, error));
-    VSHI_TRY_DONE(take_channel(image, path, options->channel, run, &plane, &owned, error));
+    VSHI_TRY_DONE(find_channel(image, path, options->channel, run, &plane, &owned, error));
     for (size_t i = 0; i < count; ++i) {
         if (!isfinite(plane[i])) {
             result = vshi_fail(error, VSH_ERROR_INPUT, "%s: pixel (%zu, %zu) is %g: expected finite numbers",
@@ -294,8 +294,8 @@ static vsh_result check_options(const vsh_mask_options *options, vsh_error *erro
     return VSH_OK;
 }
 
-vsh_result vsh_outline_from_image(const char *path, const vsh_mask_options *options, const vsh_run *run,
-                                  vsh_outline **outline, vsh_error *error) {
+vsh_result vshi_outline_from_image(const char *path, const vsh_mask_options *options, const vsh_run *run,
+                                   vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(outline);
     *outline = NULL;

@@ -1,11 +1,11 @@
-/* The border of a text's letters: fonts read by FreeType, in this process or in a reader; laid out in lines,
- * curves cut into lines. */
+/* The outline of a text's letters. FreeType reads the font, in this process or in a reader. Curves are cut
+ * into lines. */
 #include "outline/outline.h"
 
 #include "base/elementary.h"
 #include "base/file.h"
 #include "base/floats.h"
-#include "base/utf8.h"
+#include "base/text.h"
 #include "sandbox/reader.h"
 
 #include <math.h>
@@ -18,11 +18,11 @@
 #include FT_OUTLINE_H
 
 static const size_t MAX_BYTES = (size_t)1 << 20;
-/* How far lines may be from the curve that they stand for, em. */
+/* Largest distance of lines from their curve, em. */
 static const double TOLERANCE = 2e-5;
 enum { MAX_LINES = 1024 /* of a curve */ };
 
-/* The character at *at, which moves behind it; UINT32_MAX where there is no UTF-8 (RFC 3629). */
+/* Reads a character and moves *at behind it; UINT32_MAX if it is no UTF-8 (RFC 3629). */
 static uint32_t next_character(const char **at) {
     const unsigned char *c = (const unsigned char *)*at;
     const size_t length = vshi_utf8_length(*at);
@@ -34,7 +34,7 @@ static uint32_t next_character(const char **at) {
     return length > 0 ? character : UINT32_MAX;
 }
 
-/* --- a font, and where its letters go */
+/* --- fonts */
 
 typedef struct layout {
     FT_Library library;
@@ -43,7 +43,7 @@ typedef struct layout {
     const char *path;
     double scale;
     double x, y;    /* origin of the letter, em */
-    double last[2]; /* where the pen is, em */
+    double last[2]; /* place of the pen, em */
     vshi_contours *contours;
 } layout;
 
@@ -58,11 +58,11 @@ static vsh_result fail(vsh_error *error, const char *path, FT_Error code) {
                      (unsigned)code);
 }
 
-/* Opens the first face of a font file; FT_Done_FreeType() closes it, also where this fails. */
+/* Opens the first face of a font file. FT_Done_FreeType() closes it, even after a failure. */
 static vsh_result open_font(layout *l, vsh_error *error) {
     FILE *file;
     uint64_t size;
-    /* FreeType's own errors do not tell a missing file from a bad one */
+    /* FreeType's own errors do not distinguish a missing file from a bad one */
     VSHI_TRY(vshi_input_open(l->path, l->path, UINT64_MAX, &file, &size, error));
     fclose(file);
     FT_Error code = FT_Init_FreeType(&l->library);
@@ -88,7 +88,7 @@ static double line_height(const layout *l) {
     return height > 0.0 ? height : 1.2;
 }
 
-/* The distance, em, by which `right` moves when it follows `left`. */
+/* The distance, em, by which a letter moves when it follows another. */
 static double kerning(const layout *l, uint32_t left, uint32_t right) {
     FT_Vector by;
     return FT_HAS_KERNING(l->face) && FT_Get_Kerning(l->face, left, right, FT_KERNING_UNSCALED, &by) == 0
@@ -98,7 +98,7 @@ static double kerning(const layout *l, uint32_t left, uint32_t right) {
 
 /* --- letters */
 
-static void put(layout *l, const double p[2]) {
+static void draw_to(layout *l, const double p[2]) {
     vshi_contours_add(l->contours, (l->x + p[0]) * l->scale, (l->y + p[1]) * l->scale);
     memcpy(l->last, p, sizeof l->last);
 }
@@ -112,7 +112,7 @@ static int line_to(const FT_Vector *to, void *user) {
     layout *l = user;
     double p[2];
     to_em(l, to, p);
-    put(l, p);
+    draw_to(l, p);
     return 0;
 }
 
@@ -122,9 +122,9 @@ static int move_to(const FT_Vector *to, void *user) {
     return line_to(to, l);
 }
 
-/* How many lines keep a curve whose second derivative is at most `bend`: its distance from a chord over a
+/* Counts the lines for a curve. Its second derivative is at most `bend`, so its distance from a chord over a
  * part h of the parameter is at most bend h² / 8. */
-static int line_count(double bend) {
+static int count_lines(double bend) {
     const double count = ceil(sqrt(bend / (8.0 * TOLERANCE)));
     return count < 1.0 ? 1 : count < MAX_LINES ? (int)count : MAX_LINES;
 }
@@ -140,7 +140,7 @@ static int cubic_to(const FT_Vector *control1, const FT_Vector *control2, const 
         const double first = fabs(from[i] - 2.0 * c1[i] + c2[i]), second = fabs(c1[i] - 2.0 * c2[i] + to[i]);
         bend = vshi_hypot(bend, 6.0 * fmax(first, second));
     }
-    const int count = line_count(bend);
+    const int count = count_lines(bend);
     for (int k = 1; k < count; ++k) {
         const double t = (double)k / count, s = 1.0 - t;
         double p[2];
@@ -148,9 +148,9 @@ static int cubic_to(const FT_Vector *control1, const FT_Vector *control2, const 
             p[i] =
                 s * s * s * from[i] + 3.0 * s * s * t * c1[i] + 3.0 * s * t * t * c2[i] + t * t * t * to[i];
         }
-        put(l, p);
+        draw_to(l, p);
     }
-    put(l, to);
+    draw_to(l, to);
     return 0;
 }
 
@@ -161,21 +161,21 @@ static int conic_to(const FT_Vector *middle, const FT_Vector *end, void *user) {
     to_em(l, middle, control);
     to_em(l, end, to);
     const int count =
-        line_count(2.0 * vshi_hypot(from[0] - 2.0 * control[0] + to[0], from[1] - 2.0 * control[1] + to[1]));
+        count_lines(2.0 * vshi_hypot(from[0] - 2.0 * control[0] + to[0], from[1] - 2.0 * control[1] + to[1]));
     for (int k = 1; k < count; ++k) {
         const double t = (double)k / count, s = 1.0 - t;
         double p[2];
         for (int i = 0; i < 2; ++i) {
             p[i] = s * s * from[i] + 2.0 * s * t * control[i] + t * t * to[i];
         }
-        put(l, p);
+        draw_to(l, p);
     }
-    put(l, to);
+    draw_to(l, to);
     return 0;
 }
 
-/* Goes over a line of text from `at` to `end`, from l->x on, which moves to its end; draws it if `draw`. */
-static vsh_result go_over_line(layout *l, const char *at, const char *end, bool draw, vsh_error *error) {
+/* Moves l->x along a line of text from `at` to `end`, and draws the letters if `draw`. */
+static vsh_result lay_out_line(layout *l, const char *at, const char *end, bool draw, vsh_error *error) {
     static const FT_Outline_Funcs pen = {move_to, line_to, conic_to, cubic_to, 0, 0};
     uint32_t before = 0;
     while (at < end) {
@@ -219,10 +219,10 @@ static vsh_result draw_text(layout *l, const char *text, const vsh_text_options 
         end -= end > line && end[-1] == '\r' && next != NULL;
         l->x = 0.0;
         if (share > 0.0) {
-            VSHI_TRY(go_over_line(l, line, end, false, error));
+            VSHI_TRY(lay_out_line(l, line, end, false, error));
             l->x *= -share;
         }
-        VSHI_TRY(go_over_line(l, line, end, true, error));
+        VSHI_TRY(lay_out_line(l, line, end, true, error));
         l->y -= options->line_spacing * line_height(l);
         if (vshi_job_advance(job, size)) {
             return vshi_job_fail_cancelled(job, error);
@@ -232,7 +232,7 @@ static vsh_result draw_text(layout *l, const char *text, const vsh_text_options 
     return VSH_OK;
 }
 
-/* Draws a text (checked before) with a font. vshi_contours_free() also where it fails. */
+/* Draws a checked text with a font. Free the contours even after a failure. */
 static vsh_result draw(const char *text, const char *path, const vsh_text_options *options,
                        const vsh_run *run, vshi_contours *contours, vsh_error *error) {
     layout l = {.path = path, .scale = options->height, .contours = contours};
@@ -275,7 +275,7 @@ done:
     return result;
 }
 
-/* Each point goes through the checks of one that was drawn here. */
+/* Each point passes the same checks as one that was drawn here. */
 vsh_result vshi_contours_decode(vshi_decoder *decoder, vshi_contours *contours, const char *path,
                                 vsh_error *error) {
     const uint64_t count = vshi_decode_count(decoder, UINT32_MAX);
@@ -293,8 +293,8 @@ vsh_result vshi_contours_decode(vshi_decoder *decoder, vshi_contours *contours, 
                : vshi_answer_fail(path, "its contours", error);
 }
 
-static vsh_result draw_apart(const char *text, const char *path, const vsh_text_options *options,
-                             const vsh_run *run, vshi_contours *contours, vsh_error *error) {
+static vsh_result draw_by_reader(const char *text, const char *path, const vsh_text_options *options,
+                                 const vsh_run *run, vshi_contours *contours, vsh_error *error) {
     enum { UNITS = 1000 };
     vshi_exchange exchange;
     vshi_answer answer;
@@ -316,7 +316,7 @@ done:
     return result;
 }
 
-/* --- from the outside */
+/* --- the public function */
 
 static vsh_result check_text(const char *text, vsh_error *error) {
     const size_t size = strlen(text);
@@ -359,8 +359,8 @@ static vsh_result check_options(const vsh_text_options *options, vsh_error *erro
     return VSH_OK;
 }
 
-vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_text_options *options,
-                                 const vsh_run *run, vsh_outline **outline, vsh_error *error) {
+vsh_result vshi_outline_from_text(const char *text, const char *font, const vsh_text_options *options,
+                                  const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(outline);
     *outline = NULL;
@@ -374,7 +374,7 @@ vsh_result vsh_outline_from_text(const char *text, const char *font, const vsh_t
     VSHI_TRY(check_text(text, error));
     vshi_contours contours = {.run = &full_run, .error = error};
     const vsh_result result = full_run.reader != NULL
-                                  ? draw_apart(text, font, &full, &full_run, &contours, error)
+                                  ? draw_by_reader(text, font, &full, &full_run, &contours, error)
                                   : draw(text, font, &full, &full_run, &contours, error);
     if (result != VSH_OK) {
         vshi_contours_free(&contours);

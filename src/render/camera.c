@@ -1,16 +1,16 @@
+/* Cameras: their checks, and views that show a box or points. */
 #include "base/elementary.h"
-#include "base/error.h"
 #include "base/floats.h"
 #include "base/job.h"
-#include "render/render.h"
+#include "base/vec.h"
+
+#include <vdbshade/picture.h>
 
 static const double FOV_LEAST = 0.001, FOV_MOST = 3.0;
-/* Sine of the angle between view and up below which there is no telling what is up. */
+/* Smallest sine of the angle between view and up. */
 static const double PARALLEL = 1e-6;
-/* Of the picture's edge that a framed box leaves free. */
-static const double MARGIN = 1.06;
-/* The same of framed points. */
-static const double POINTS_MARGIN = 1.16;
+/* Size of the picture over that of a framed box, and of framed points. */
+static const double MARGIN = 1.06, POINTS_MARGIN = 1.16;
 
 static vsh_result check_vector(const char *name, const double v[3], vsh_error *error) {
     return vshi_finite(vshi_vec_of(v))
@@ -19,7 +19,7 @@ static vsh_result check_vector(const char *name, const double v[3], vsh_error *e
                            v[1], v[2]);
 }
 
-/* What does not concern where the camera is. */
+/* Checks the members other than position and target. */
 static vsh_result check_lens(const vsh_camera *camera, vsh_error *error) {
     const double *up = camera->up;
     VSHI_TRY(check_vector("up", up, error));
@@ -60,33 +60,17 @@ vsh_result vsh_camera_check(const vsh_camera *camera, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Two horizontal axes: to the front, where azimuths begin, and to the right of who looks back from there. */
-static void horizon(vshi_vec up, vshi_vec *front, vshi_vec *right) {
-    const vshi_vec z = {0.0, 0.0, 1.0}, y = {0.0, -1.0, 0.0};
-    const vshi_vec wish = fabs(up.z) < 0.9 ? z : y;
-    *front = vshi_unit(vshi_sub(wish, vshi_scale(up, vshi_dot(wish, up))));
-    *right = vshi_cross(up, *front);
-}
-
-static vsh_result check_view(double azimuth, double elevation, double aspect, vsh_error *error) {
-    if (isfinite(azimuth) && fabs(elevation) <= 1.57 && aspect > 0.0 && isfinite(aspect)) {
-        return VSH_OK;
-    }
-    return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                     "camera: azimuth %g, elevation %g, aspect %g: expected a number, -1.57 … 1.57 and a "
-                     "number above 0",
-                     azimuth, elevation, aspect);
-}
-
 /* Unit axes of a view: to the right, up, and back towards the eye. */
 typedef struct view_axes {
     vshi_vec across, over, back;
 } view_axes;
 
-static view_axes axes_of(const vsh_camera *camera, double azimuth, double elevation) {
+static view_axes find_axes(const vsh_camera *camera, double azimuth, double elevation) {
     const vshi_vec up = vshi_unit(vshi_vec_of(camera->up));
-    vshi_vec front, right;
-    horizon(up, &front, &right);
+    const vshi_vec wish =
+        fabs(up.z) < 0.9 ? (vshi_vec){0.0, 0.0, 1.0} : (vshi_vec){0.0, -1.0, 0.0}; /* azimuth 0 */
+    const vshi_vec front = vshi_unit(vshi_sub(wish, vshi_scale(up, vshi_dot(wish, up))));
+    const vshi_vec right = vshi_cross(up, front);
     const vshi_vec level =
         vshi_add(vshi_scale(front, vshi_cos(azimuth)), vshi_scale(right, vshi_sin(azimuth)));
     view_axes axes;
@@ -100,18 +84,24 @@ static void set(double to[3], vshi_vec v) {
     to[0] = v.x, to[1] = v.y, to[2] = v.z;
 }
 
+/* Resolves and checks a camera that is about to be placed, and finds its axes. */
 static vsh_result begin_frame(const vsh_camera *camera, double azimuth, double elevation, double aspect,
                               vsh_camera *full, view_axes *axes, vsh_error *error) {
     VSHI_TRY(resolve(camera, full, error));
     VSHI_TRY(check_lens(full, error));
-    VSHI_TRY(check_view(azimuth, elevation, aspect, error));
-    *axes = axes_of(full, azimuth, elevation);
+    if (!(isfinite(azimuth) && fabs(elevation) <= 1.57 && aspect > 0.0 && isfinite(aspect))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "camera: azimuth %g, elevation %g, aspect %g: expected a number, -1.57 … 1.57 and a "
+                         "number above 0",
+                         azimuth, elevation, aspect);
+    }
+    *axes = find_axes(full, azimuth, elevation);
     return VSH_OK;
 }
 
-/* A point is in the picture where across - eye's is within tangent × (eye's back - back) on both sides; so
- * the eye stands where the largest of across + tangent × back and of -across + tangent × back meet, and the
- * same of over: the nearest place from which all are seen. */
+/* A point with coordinates `across` and `back` is visible if |across - eye's across| <= tangent × (eye's back
+ * - back). So the nearest eye that sees all points lies where the largest across + tangent × back meets the
+ * largest tangent × back - across. The same holds for `over`. */
 vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const double *points, double azimuth,
                                    double elevation, double aspect, vsh_error *error) {
     VSHI_FLOATS;
@@ -165,7 +155,7 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
     if (!vshi_finite(low) || !vshi_finite(high) || !vshi_finite(size) || size.x < 0.0 || size.y < 0.0 ||
         size.z < 0.0 || !(vshi_length(size) > 0.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "camera: the box from (%g, %g, %g) to (%g, %g, %g) is none", low.x, low.y, low.z,
+                         "camera: the box from (%g, %g, %g) to (%g, %g, %g) has no size", low.x, low.y, low.z,
                          high.x, high.y, high.z);
     }
     const double tangent = vshi_tan(0.5 * full.fov) / MARGIN;
@@ -191,14 +181,4 @@ void vsh_camera_orbit(vsh_camera *camera, double angle) {
     const vshi_vec turned = vshi_add(vshi_add(vshi_scale(arm, c), vshi_scale(vshi_cross(axis, arm), s)),
                                      vshi_scale(axis, vshi_dot(axis, arm) * (1.0 - c)));
     set(camera->position, vshi_add(target, turned));
-}
-
-vshi_view_frame vshi_camera_frame(const vsh_camera *camera, int32_t width, int32_t height) {
-    vshi_view_frame frame = {.eye = vshi_vec_of(camera->position), .middle = {0.5 * width, 0.5 * height}};
-    frame.forward = vshi_unit(vshi_sub(vshi_vec_of(camera->target), frame.eye));
-    const double pixel = 2.0 * vshi_tan(0.5 * camera->fov) / height;
-    const vshi_vec right = vshi_unit(vshi_cross(frame.forward, vshi_unit(vshi_vec_of(camera->up))));
-    frame.right = vshi_scale(right, pixel);
-    frame.down = vshi_scale(vshi_cross(frame.forward, right), pixel);
-    return frame;
 }

@@ -1,5 +1,6 @@
+/* Meshes with lightmaps on them, rasterised at a picture's samples. */
 #include "base/memory.h"
-#include "image/planes.h"
+#include "image/image.h"
 #include "mesh/mesh.h"
 #include "render/render.h"
 #include "shade/shade.h"
@@ -8,10 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of one vsh_lit_meshes. */
 typedef struct lightmap {
     const vsh_lit_meshes *of;
-    const float *irradiance[3]; /* all NULL, or none */
+    const float *irradiance[3]; /* three, or all NULL */
     const float **shadow;       /* [light_count], without irradiance */
     const float *ao;            /* or NULL */
 } lightmap;
@@ -28,7 +28,7 @@ struct vshi_lit {
     size_t light_count;
     vshi_sample_grid grid;
     lightmap *maps;
-    const float **planes; /* of all maps' shadows */
+    const float **planes; /* shadows of all maps */
     triangle *triangles;
     size_t triangle_count;
 };
@@ -82,10 +82,10 @@ static vsh_result find_planes(const vshi_lit *lit, size_t index, lightmap *map, 
     }
     return lit->light_count > 0 || map->ao != NULL
                ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_INPUT,
-                           "lightmap %zu: no channel ao, nor irradiance.R, .G and .B, and no "
-                           "lights whose shadows it could have",
-                           index);
+               : vshi_fail(
+                     error, VSH_ERROR_INPUT,
+                     "lightmap %zu: no channel ao, nor irradiance.R, .G and .B, and the scene has no lights",
+                     index);
 }
 
 static vsh_result check_meshes(const vsh_lit_meshes *of, size_t index, vsh_error *error) {
@@ -122,7 +122,7 @@ static int32_t within(double x, int32_t count) {
 }
 
 /* Columns and rows of the samples that a triangle's projection may cover, a cell's jitter included. */
-static void bound(const vshi_sample_grid *grid, triangle *t) {
+static void find_bounds(const vshi_sample_grid *grid, triangle *t) {
     const vshi_view_frame *frame = &grid->frame;
     const double pixel2 = vshi_dot(frame->right, frame->right);
     const int32_t count[2] = {grid->columns, grid->rows};
@@ -147,7 +147,7 @@ static void bound(const vshi_sample_grid *grid, triangle *t) {
     }
 }
 
-static void place(vshi_lit *lit) {
+static void place_triangles(vshi_lit *lit) {
     size_t at = 0;
     for (size_t i = 0; i < lit->options->lit_count; ++i) {
         const vsh_lit_meshes *of = &lit->options->lit[i];
@@ -162,7 +162,7 @@ static void place(vshi_lit *lit) {
                 t->map = (uint32_t)i;
                 t->mesh = (uint32_t)m;
                 t->number = (uint32_t)k;
-                bound(&lit->grid, t);
+                find_bounds(&lit->grid, t);
             }
         }
     }
@@ -174,21 +174,21 @@ vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *l
     if (options->lit_count == 0) {
         return VSH_OK;
     }
+    const size_t count = count_triangles(options), shadows = options->lit_count * light_count;
     vshi_lit *made;
     vsh_result result;
-    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "lit meshes", error));
-    *made = (vshi_lit){.options = options, .lights = lights, .light_count = light_count, .grid = *grid};
-    made->triangle_count = count_triangles(options);
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&made->maps, options->lit_count, sizeof *made->maps, "lit meshes", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&made->planes, options->lit_count * light_count,
-                                sizeof *made->planes, "lit meshes", error));
-    if (made->triangle_count >= UINT32_MAX) {
-        result = vshi_fail(error, VSH_ERROR_LIMIT, "lit meshes: more than 2^32 - 2 triangles");
-        goto done;
+    if (count >= UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT, "lit meshes: more than 2^32 - 2 triangles");
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&made->triangles, made->triangle_count, sizeof *made->triangles,
-                                "lit meshes", error));
+    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "lit meshes", error));
+    *made = (vshi_lit){.options = options,
+                       .lights = lights,
+                       .light_count = light_count,
+                       .grid = *grid,
+                       .triangle_count = count};
+    const vshi_array arrays[] = {VSHI_ARRAY(made->maps, options->lit_count),
+                                 VSHI_ARRAY(made->planes, shadows), VSHI_ARRAY(made->triangles, count)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "lit meshes", error));
     for (size_t i = 0; i < options->lit_count; ++i) {
         made->maps[i].of = &options->lit[i];
         made->maps[i].shadow = made->planes != NULL ? made->planes + i * light_count : NULL;
@@ -196,7 +196,7 @@ vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *l
             VSHI_TRY_DONE(find_planes(made, i, &made->maps[i], error));
         }
     }
-    place(made);
+    place_triangles(made);
     *lit = made;
     made = NULL;
 done:
@@ -214,10 +214,6 @@ static bool cross_triangle(const triangle *t, vshi_vec ray, double weight[3]) {
         below += weight[k] <= 0.0;
     }
     return (above == 3 || below == 3) && above + below < 6;
-}
-
-static vshi_vec normal_of(const triangle *t) {
-    return vshi_cross(vshi_sub(t->corner[1], t->corner[0]), vshi_sub(t->corner[2], t->corner[0]));
 }
 
 void vshi_lit_raster(const vshi_lit *lit, const vshi_lit_band *band, size_t strip) {
@@ -239,7 +235,8 @@ void vshi_lit_raster(const vshi_lit *lit, const vshi_lit_band *band, size_t stri
         if (left > right || top > bottom) {
             continue;
         }
-        const vshi_vec normal = normal_of(t);
+        const vshi_vec normal =
+            vshi_cross(vshi_sub(t->corner[1], t->corner[0]), vshi_sub(t->corner[2], t->corner[0]));
         const double height = vshi_dot(t->corner[0], normal);
         for (int32_t row = top; row <= bottom; ++row) {
             for (int32_t column = left; column <= right; ++column) {

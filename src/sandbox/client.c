@@ -1,4 +1,4 @@
-/* The caller's side: starts a reader, waits for its end, and looks over what every answer has in common. */
+/* The caller: starts a reader, waits for its end, and checks the common parts of its answer. */
 #define _GNU_SOURCE
 
 #include "base/clock.h"
@@ -25,21 +25,21 @@
 
 enum {
     POLL_MS = 20,
-    FIRST_FREE = 16,    /* descriptors of ours go here and above, clear of those that a reader gets */
-    MAX_WARNINGS = 4096 /* of one file that are passed on */
+    FIRST_FREE = 16,    /* our descriptors are at least this, above those of a reader */
+    MAX_WARNINGS = 4096 /* of one file */
 };
 
-/* Seconds that a file may take where run->reader_seconds is 0: Assimp's readers take 0.03 s a MB on an
- * idle core, and ten times as long where many share it. */
+/* Limit of seconds for a file if run->reader_seconds is 0. Assimp's readers take 0.03 s a MB on an idle core,
+ * and ten times as long on a busy one. */
 static const double seconds_at_least = 60.0, seconds_a_byte = 1e-6;
 
-/* How long a reader that has closed its descriptors may live on. */
+/* Limit of seconds between a reader's closing of its descriptors and its end. */
 static const double seconds_to_end = 5.0;
 
-/* Set in the environment of every reader, which must not start a reader of its own. */
+/* Set in the environment of every reader, so that it starts no reader itself. */
 #define IN_READER "VSH_IN_READER"
 
-/* A reader under way. Descriptors are -1 where there is none. */
+/* A running reader. -1: no descriptor. */
 typedef struct reader_process {
     pid_t pid;
     int answer, progress;
@@ -73,7 +73,7 @@ static int add_folder(struct dl_phdr_info *info, size_t size, void *user) {
     return 0;
 }
 
-/* Puts the folders that this process's libraries are loaded from: the reader loads the same. */
+/* Encodes the folders of this process's libraries: the reader loads the same. */
 static void encode_folders(vshi_encoder *encoder) {
     folder_list list = {{NULL}, 0};
     dl_iterate_phdr(add_folder, &list);
@@ -86,30 +86,18 @@ static void encode_folders(vshi_encoder *encoder) {
 
 /* --- the program */
 
-/* The folder of the file that holds this code: the library, or a program that is linked with its objects. */
-static bool own_folder(char folder[PATH_MAX]) {
-    static const char here; /* in this file */
-    Dl_info info;
-    const bool found = dladdr(&here, &info) != 0 && info.dli_fname != NULL;
-    char name[PATH_MAX];
-    /* a program's own name is what it was called by */
-    if (!found ||
-        realpath(strchr(info.dli_fname, '/') != NULL ? info.dli_fname : "/proc/self/exe", name) == NULL) {
-        return false;
-    }
-    char *slash = strrchr(name, '/');
-    *slash = '\0';
-    memcpy(folder, name, sizeof name);
-    return true;
-}
-
-/* VSH_READER: beside the library as it is built, in libexec as it is installed. */
-static bool find_own(char path[PATH_MAX]) {
+/* Finds VSH_READER: beside the library (as built), or in libexec (as installed). */
+static bool find_own_reader(char path[PATH_MAX]) {
     static const char *const places[] = {".", VSHI_READER_FOLDER};
+    static const char here; /* in the library, or in a program that is linked with its objects */
     char folder[PATH_MAX];
-    if (!own_folder(folder)) {
+    Dl_info info;
+    if (dladdr(&here, &info) == 0 || info.dli_fname == NULL ||
+        /* a program's name is the word that it was called by */
+        realpath(strchr(info.dli_fname, '/') != NULL ? info.dli_fname : "/proc/self/exe", folder) == NULL) {
         return false;
     }
+    *strrchr(folder, '/') = '\0';
     for (size_t i = 0; i < sizeof places / sizeof places[0]; ++i) {
         const bool whole = places[i][0] == '/';
         const int length = snprintf(path, PATH_MAX, "%s%s%s/%s", whole ? "" : folder, whole ? "" : "/",
@@ -123,22 +111,12 @@ static bool find_own(char path[PATH_MAX]) {
 
 /* --- its environment */
 
-/* Variables that a reader's libraries act on; what else a host has there (tokens, passwords) is none of a
- * hostile file's business. */
+/* Passes variables that a reader's libraries use. A hostile file must not see the others (tokens, passwords).
+ */
 static bool is_passed(const char *variable) {
-    static const char *const beginnings[] = {"LD_",
-                                             "LC_",
-                                             "LANG",
-                                             "TZ=",
-                                             "MALLOC_",
-                                             "GLIBC_TUNABLES=",
-                                             "ASAN_",
-                                             "LSAN_",
-                                             "TSAN_",
-                                             "UBSAN_",
-                                             "LLVM_PROFILE_FILE=",
-                                             "GCOV_",
-                                             "VSH_TEST_"};
+    static const char *const beginnings[] =
+        VSHI_LIST("LD_", "LC_", "LANG", "TZ=", "MALLOC_", "GLIBC_TUNABLES=", "ASAN_", "LSAN_", "TSAN_",
+                  "UBSAN_", "LLVM_PROFILE_FILE=", "GCOV_", "VSH_TEST_");
     for (size_t i = 0; i < sizeof beginnings / sizeof beginnings[0]; ++i) {
         if (strncmp(variable, beginnings[i], strlen(beginnings[i])) == 0) {
             return true;
@@ -154,22 +132,23 @@ static char **make_environment(char *mark) {
         ++count;
     }
     char **made = malloc((count + 2) * sizeof *made);
-    for (size_t i = 0; made != NULL && i < count; ++i) {
+    if (made == NULL) {
+        return NULL;
+    }
+    for (size_t i = 0; i < count; ++i) {
         if (is_passed(environ[i])) {
             made[passed++] = environ[i];
         }
     }
-    if (made != NULL) {
-        made[passed++] = mark;
-        made[passed] = NULL;
-    }
+    made[passed++] = mark;
+    made[passed] = NULL;
     return made;
 }
 
 /* --- the process */
 
-static int give_files(posix_spawn_file_actions_t *files, const vshi_exchange *exchange, int answer,
-                      int progress) {
+static int add_descriptors(posix_spawn_file_actions_t *files, const vshi_exchange *exchange, int answer,
+                           int progress) {
     const struct {
         int from, to;
     } given[] = {{answer, VSHI_READER_ANSWER},
@@ -178,7 +157,7 @@ static int give_files(posix_spawn_file_actions_t *files, const vshi_exchange *ex
     int reason = posix_spawn_file_actions_addopen(files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     reason = reason != 0 ? reason
                          : posix_spawn_file_actions_addopen(files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    if (reason == 0 && !VSHI_SANITIZED) { /* sanitizers report there */
+    if (reason == 0 && !VSHI_SANITIZED) { /* sanitizers report on standard error */
         reason = posix_spawn_file_actions_addopen(files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
     }
     for (size_t i = 0; reason == 0 && i < sizeof given / sizeof given[0]; ++i) {
@@ -187,7 +166,7 @@ static int give_files(posix_spawn_file_actions_t *files, const vshi_exchange *ex
     return reason != 0 ? reason : posix_spawn_file_actions_addclosefrom_np(files, VSHI_READER_PROGRESS + 1);
 }
 
-/* The reader leaves our process group, so that an interrupt on the terminal reaches it through us. */
+/* The reader gets its own process group, so that an interrupt on the terminal reaches only us. */
 static void set_attributes(posix_spawnattr_t *attributes) {
     sigset_t none, all;
     sigemptyset(&none);
@@ -199,16 +178,15 @@ static void set_attributes(posix_spawnattr_t *attributes) {
                              POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
 }
 
-/* Starts exchange->run->reader with these descriptors. Returns 0 or what errno says. Nothing but
- * posix_spawn(): between fork and exec none of our code runs, as it must not in a process that
- * may have threads. */
+/* Starts exchange->run->reader with these descriptors. Returns 0 or an error number. posix_spawn() runs none
+ * of our code between fork and exec, which is not safe in a process with threads. */
 static int spawn_reader(const vshi_exchange *exchange, int answer, int progress, pid_t *pid) {
     char own[PATH_MAX], name[] = VSH_READER, argument[] = VSH_READER_ARGUMENT, mark[] = IN_READER "=1";
     char *const arguments[] = {name, argument, NULL};
     const char *program = exchange->run->reader;
     if (strcmp(program, VSH_READER) == 0) {
-        /* sanitized tests are linked with the objects, so they are their own readers */
-        program = find_own(own) ? own : VSHI_SANITIZED ? "/proc/self/exe" : NULL;
+        /* sanitized tests contain the objects, so they are their own readers */
+        program = find_own_reader(own) ? own : VSHI_SANITIZED ? "/proc/self/exe" : NULL;
     }
     if (program == NULL) {
         return ENOENT;
@@ -224,7 +202,7 @@ static int spawn_reader(const vshi_exchange *exchange, int answer, int progress,
     reason = posix_spawnattr_init(&attributes);
     if (reason == 0) {
         set_attributes(&attributes);
-        reason = give_files(&files, exchange, answer, progress);
+        reason = add_descriptors(&files, exchange, answer, progress);
         reason =
             reason != 0 ? reason : posix_spawnp(pid, program, &files, &attributes, arguments, environment);
         posix_spawnattr_destroy(&attributes);
@@ -247,19 +225,20 @@ static double seconds_for(const char *path, const vsh_run *run) {
 static vsh_result fail_start(const vshi_exchange *exchange, int reason, vsh_error *error) {
     const char *why = strerrordesc_np(reason);
     const bool missing = reason == ENOENT || reason == EACCES || reason == ENOEXEC || reason == ENOTDIR;
-    return vshi_fail(error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
-                     "%s: no process to read it in: '%s': %s; a file that is trusted can be read without "
-                     "(--sandbox off; no vsh_run.reader)",
-                     exchange->path, exchange->run->reader, why != NULL ? why : "?");
+    return vshi_fail(
+        error, missing ? VSH_ERROR_ARGUMENT : VSH_ERROR_MEMORY,
+        "%s: cannot start the process that reads it, '%s': %s; trusted files can be read without "
+        "(--sandbox off; no vsh_run.reader)",
+        exchange->path, exchange->run->reader, why != NULL ? why : "?");
 }
 
-/* Moves a descriptor up, and keeps it from other programs that the host may start meanwhile. */
+/* Moves a descriptor to FIRST_FREE or above. Other programs that the host starts do not inherit it. */
 static int lift(int file) {
     if (file < 0 || file >= FIRST_FREE) {
         return file;
     }
     const int lifted = fcntl(file, F_DUPFD_CLOEXEC, FIRST_FREE);
-    const int reason = errno == EINVAL ? EMFILE : errno; /* the process may have no more than FIRST_FREE */
+    const int reason = errno == EINVAL ? EMFILE : errno; /* EINVAL: the limit of descriptors is FIRST_FREE */
     close(file);
     errno = reason;
     return lifted;
@@ -268,7 +247,7 @@ static int lift(int file) {
 vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path, const vsh_run *run,
                                vsh_error *error) {
     if (getenv(IN_READER) != NULL) {
-        /* otherwise a program that names itself as its reader would start itself forever */
+        /* otherwise a program that is its own reader would start itself forever */
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: not read: this process is a reader itself; main has to call vsh_reader_serve() "
                          "before anything else",
@@ -294,7 +273,7 @@ vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char
     return VSH_OK;
 }
 
-static vsh_result start(const vshi_exchange *exchange, reader_process *process, vsh_error *error) {
+static vsh_result start_reader(const vshi_exchange *exchange, reader_process *process, vsh_error *error) {
     int ends[2] = {-1, -1};
     *process = (reader_process){-1, -1, -1, vshi_seconds()};
     process->answer = lift(memfd_create("vdbshade answer", MFD_CLOEXEC | MFD_ALLOW_SEALING));
@@ -312,16 +291,16 @@ static vsh_result start(const vshi_exchange *exchange, reader_process *process, 
 
 /* --- waiting */
 
-/* Drains the pipe; false once the other side has closed it. */
-static bool take_progress(int file, double *fraction) {
-    double told[64];
+/* Drains the pipe; returns false after the reader has closed it. */
+static bool read_progress(int file, double *fraction) {
+    double reports[64];
     for (;;) {
-        const ssize_t size = read(file, told, sizeof told);
+        const ssize_t size = read(file, reports, sizeof reports);
         if (size <= 0) {
             return size < 0 && (errno == EAGAIN || errno == EINTR);
         }
-        const size_t count = (size_t)size / sizeof told[0];
-        const double last = count > 0 ? told[count - 1] : 0.0;
+        const size_t count = (size_t)size / sizeof reports[0];
+        const double last = count > 0 ? reports[count - 1] : 0.0;
         *fraction = last > *fraction && last <= 1.0 ? last : *fraction;
     }
 }
@@ -339,19 +318,19 @@ static vsh_result fail_time(const vshi_exchange *exchange, double seconds, vsh_e
                      exchange->path, seconds);
 }
 
-/* Waits for the end, which shows in *status. A host that ignores SIGCHLD, or waits for all its children,
- * takes that away: *status is then 0, and the answer alone tells. */
-static vsh_result await(const vshi_exchange *exchange, reader_process *process, vshi_poll_fn *poll_user,
-                        void *user, int *status, vsh_error *error) {
+/* Waits for the reader's end, and sets *status. If the host ignores SIGCHLD or waits for all its children,
+ * *status is 0, and only the answer shows a failure. */
+static vsh_result await_end(const vshi_exchange *exchange, reader_process *process, vshi_poll_fn *poll_user,
+                            void *user, int *status, vsh_error *error) {
     const double limit = seconds_for(exchange->path, exchange->run);
     double closed = INFINITY, fraction = 0.0;
     for (;;) {
-        if (closed < INFINITY) { /* it is about to end */
+        if (closed < INFINITY) { /* it ends soon */
             nanosleep(&(struct timespec){0, 200000}, NULL);
         } else {
             struct pollfd pipe_end = {process->progress, POLLIN, 0};
             poll(&pipe_end, 1, POLL_MS);
-            closed = take_progress(process->progress, &fraction) ? INFINITY : vshi_seconds();
+            closed = read_progress(process->progress, &fraction) ? INFINITY : vshi_seconds();
         }
         const pid_t ended = waitpid(process->pid, status, WNOHANG);
         if (ended == process->pid || (ended < 0 && errno == ECHILD)) {
@@ -374,8 +353,7 @@ static vsh_result await(const vshi_exchange *exchange, reader_process *process, 
 /* --- the answer */
 
 vsh_result vshi_answer_fail(const char *path, const char *what, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: what its reader sent does not hold: %s", path,
-                     what);
+    return vshi_fail(error, VSH_ERROR_READ, "%s: damaged: its reader sent a bad answer: %s", path, what);
 }
 
 static vsh_result fail_memory(const vshi_exchange *exchange, vsh_error *error) {
@@ -388,7 +366,7 @@ static vsh_result fail_memory(const vshi_exchange *exchange, vsh_error *error) {
                      exchange->path, limit);
 }
 
-/* Why there is no answer. */
+/* Fails with the reason why there is no answer. */
 static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun, vsh_error *error) {
     if (WIFSIGNALED(status)) {
         const int number = WTERMSIG(status);
@@ -406,7 +384,7 @@ static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun
         return fail_memory(exchange, error);
     case VSHI_READER_FILE_LIMIT:
         return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "%s: what its reader sends is more than this process's limit on the size of files "
+                         "%s: its reader's answer exceeds this process's limit on the size of files "
                          "(ulimit -f); raise it, or read without a reader",
                          path);
     case VSHI_READER_EMPTY:
@@ -423,7 +401,7 @@ static vsh_result fail_end(const vshi_exchange *exchange, int status, bool begun
     }
 }
 
-/* Maps what the reader has written once nobody can write there any more. */
+/* Seals the answer, so that it cannot change any more, and maps it. */
 static vsh_result map_answer(const vshi_exchange *exchange, int file, vshi_answer *answer, vsh_error *error) {
     struct stat status;
     if (fcntl(file, F_ADD_SEALS, F_SEAL_SHRINK | F_SEAL_GROW | F_SEAL_WRITE | F_SEAL_SEAL) != 0 ||
@@ -431,11 +409,11 @@ static vsh_result map_answer(const vshi_exchange *exchange, int file, vshi_answe
         return vshi_answer_fail(exchange->path, "it is still being written", error);
     }
     if (status.st_size < (off_t)sizeof(vshi_answer_head)) {
-        return VSH_OK; /* nothing was answered */
+        return VSH_OK; /* there is no answer */
     }
-    /* what it holds is copied before it goes, but for a model's arrays */
+    /* its content is copied, except a model's arrays */
     VSHI_TRY(vshi_check_limit(exchange->run, 2.0 * (double)status.st_size, exchange->path, error));
-    /* all of it is looked at; pages that a reader left out would be made */
+    /* map all pages at once, unless the reader left holes, which would become pages */
     const int whole = status.st_blocks >= status.st_size / 512 ? MAP_POPULATE : 0;
     void *map = mmap(NULL, (size_t)status.st_size, PROT_READ, MAP_SHARED | whole, file, 0);
     if (map == MAP_FAILED) {
@@ -457,10 +435,10 @@ static void pass_warnings(const vshi_exchange *exchange, vshi_decoder warnings, 
     }
 }
 
-/* Said with every file: whoever gets the warnings folds those that are alike. */
+/* Warns for every file. The callback may fold equal warnings. */
 static void warn_of_missing(const vshi_exchange *exchange, uint64_t confined) {
     char missing[VSHI_MISSING_TEXT];
-    /* many a system has no Landlock: a warning in every run would be noise, and others would drown in it */
+    /* no warning for Landlock: many systems lack it */
     const uint64_t expected = VSH_CONFINED_LIMITS | VSH_CONFINED_CALLS;
     if ((confined & expected) != expected && !VSHI_SANITIZED) {
         vshi_warn(exchange->run,
@@ -469,7 +447,7 @@ static void warn_of_missing(const vshi_exchange *exchange, uint64_t confined) {
     }
 }
 
-static vsh_result take_head(const vshi_exchange *exchange, int status, vshi_answer *answer,
+static vsh_result read_head(const vshi_exchange *exchange, int status, vshi_answer *answer,
                             vsh_error *error) {
     vshi_answer_head head = {0};
     if (answer->map != NULL) {
@@ -512,7 +490,7 @@ static vsh_result send_request(vshi_exchange *exchange, vshi_poll_fn *poll_user,
     if (poll_user(user, 0.0)) {
         return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", exchange->path);
     }
-    return start(exchange, process, error);
+    return start_reader(exchange, process, error);
 }
 
 vsh_result vshi_exchange_send(vshi_exchange *exchange, vshi_poll_fn *poll_user, void *user,
@@ -523,9 +501,9 @@ vsh_result vshi_exchange_send(vshi_exchange *exchange, vshi_poll_fn *poll_user, 
     vsh_result result = send_request(exchange, poll_user, user, &process, error);
     close(exchange->encoder.file);
     VSHI_TRY_DONE(result);
-    VSHI_TRY_DONE(await(exchange, &process, poll_user, user, &status, error));
+    VSHI_TRY_DONE(await_end(exchange, &process, poll_user, user, &status, error));
     VSHI_TRY_DONE(map_answer(exchange, process.answer, answer, error));
-    VSHI_TRY_DONE(take_head(exchange, status, answer, error));
+    VSHI_TRY_DONE(read_head(exchange, status, answer, error));
 done:
     if (process.answer >= 0) {
         close(process.answer);
@@ -588,7 +566,7 @@ vsh_result vsh_reader_confinement(const vsh_run *run, uint32_t *confined, vsh_er
     vshi_answer answer;
     vsh_result result;
     VSHI_TRY(vshi_allocate((void **)&exchange, 1, sizeof *exchange, "reader", error));
-    full.warning = NULL; /* what is missing is the result */
+    full.warning = NULL; /* the result tells the missing parts */
     VSHI_TRY_DONE(vshi_exchange_begin(exchange, VSHI_READ_CONFINEMENT, "reader", &full, error));
     VSHI_TRY_DONE(vshi_exchange_send(exchange, poll_nothing, &full, &answer, error));
     *confined = answer.confined;

@@ -1,5 +1,4 @@
-/* The reader's side before anything is parsed, or any library loaded that could: its request, and all of its
- * confinement. */
+/* A reader before it parses or loads a library that parses: reads its request, and confines itself. */
 #define _GNU_SOURCE
 #include "sandbox/confine.h"
 
@@ -96,25 +95,25 @@ static bool limit(int what, rlim_t most) {
     if (getrlimit((__rlimit_resource_t)what, &now) == 0 && most > now.rlim_max) {
         most = now.rlim_max;
     }
-    /* who passes both limits of time at once is killed, and does not say of what */
+    /* SIGXCPU tells the reason; the hard limit kills without one */
     const struct rlimit limits = {most, what == RLIMIT_CPU && most < now.rlim_max ? most + 1 : most};
     return setrlimit((__rlimit_resource_t)what, &limits) == 0;
 }
 
-static uint64_t stacks(void) {
+static uint64_t stack_bytes(void) {
     struct rlimit stack;
     const long cores = sysconf(_SC_NPROCESSORS_ONLN);
     const bool less = getrlimit(RLIMIT_STACK, &stack) == 0 && stack.rlim_cur < most_stack;
     return (uint64_t)(cores > 0 ? cores : 1) * (less ? (uint64_t)stack.rlim_cur : most_stack);
 }
 
-bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds) {
+bool vshi_confine_resources(uint64_t memory, uint64_t base, double seconds) {
     if (memory == 0) {
         memory = (uint64_t)sysconf(_SC_PHYS_PAGES) * (uint64_t)sysconf(_SC_PAGE_SIZE);
     }
     bool all = prctl(PR_SET_PDEATHSIG, SIGKILL) == 0;
     all = prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 && all;
-    if (!VSHI_SANITIZED) { /* whose runtime reads /proc/self */
+    if (!VSHI_SANITIZED) { /* a sanitizer reads /proc/self */
         all = prctl(PR_SET_DUMPABLE, 0, 0, 0, 0) == 0 && all;
     }
     all = limit(RLIMIT_CORE, 0) && all;
@@ -124,7 +123,7 @@ bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds) {
         all = limit(RLIMIT_FSIZE, (rlim_t)memory + (1 << 20)) && all;
         if (!VSHI_SANITIZED) {
             all = limit(RLIMIT_AS, (rlim_t)(memory + address_space_slack)) && all;
-            all = limit(RLIMIT_DATA, (rlim_t)(memory + beside + stacks())) && all;
+            all = limit(RLIMIT_DATA, (rlim_t)(memory + base + stack_bytes())) && all;
         }
     }
     signal(SIGXFSZ, SIG_IGN); /* the write fails instead */
@@ -133,80 +132,27 @@ bool vshi_confine_resources(uint64_t memory, uint64_t beside, double seconds) {
 
 /* --- a filter of system calls */
 
-/* Calls that parsing needs, whatever their arguments. */
-static const int allowed[] = {
-    SCMP_SYS(access),
-    SCMP_SYS(arch_prctl),
-    SCMP_SYS(brk),
-    SCMP_SYS(clock_getres),
-    SCMP_SYS(clock_gettime),
-    SCMP_SYS(clock_nanosleep),
-    SCMP_SYS(close),
-    SCMP_SYS(dup),
-    SCMP_SYS(exit),
-    SCMP_SYS(exit_group),
-    SCMP_SYS(faccessat),
-    SCMP_SYS(faccessat2),
-    SCMP_SYS(fadvise64),
-    SCMP_SYS(fstat),
-    SCMP_SYS(fstatfs),
-    SCMP_SYS(futex),
-    SCMP_SYS(getcpu),
-    SCMP_SYS(getcwd),
-    SCMP_SYS(getdents64),
-    SCMP_SYS(getegid),
-    SCMP_SYS(geteuid),
-    SCMP_SYS(getgid),
-    SCMP_SYS(getpid),
-    SCMP_SYS(getppid),
-    SCMP_SYS(getrandom),
-    SCMP_SYS(getrlimit),
-    SCMP_SYS(getrusage),
-    SCMP_SYS(gettid),
-    SCMP_SYS(gettimeofday),
-    SCMP_SYS(getuid),
-    SCMP_SYS(lseek),
-    SCMP_SYS(lstat),
-    SCMP_SYS(madvise),
-    SCMP_SYS(membarrier),
-    SCMP_SYS(mmap),
-    SCMP_SYS(mprotect),
-    SCMP_SYS(mremap),
-    SCMP_SYS(munmap),
-    SCMP_SYS(nanosleep),
-    SCMP_SYS(newfstatat),
-    SCMP_SYS(poll),
-    SCMP_SYS(ppoll),
-    SCMP_SYS(pread64),
-    SCMP_SYS(preadv),
-    SCMP_SYS(pwrite64),
-    SCMP_SYS(read),
-    SCMP_SYS(readlink),
-    SCMP_SYS(readlinkat),
-    SCMP_SYS(readv),
-    SCMP_SYS(restart_syscall),
-    SCMP_SYS(rseq),
-    SCMP_SYS(rt_sigaction),
-    SCMP_SYS(rt_sigprocmask),
-    SCMP_SYS(rt_sigreturn),
-    SCMP_SYS(sched_getaffinity),
-    SCMP_SYS(sched_yield),
-    SCMP_SYS(set_robust_list),
-    SCMP_SYS(set_tid_address),
-    SCMP_SYS(sigaltstack),
-    SCMP_SYS(stat),
-    SCMP_SYS(statx),
-    SCMP_SYS(sysinfo),
-    SCMP_SYS(uname),
-    SCMP_SYS(write),
-    SCMP_SYS(writev),
-};
+/* Calls that parsing needs, with any arguments. */
+static const int allowed[] = VSHI_LIST(
+    SCMP_SYS(access), SCMP_SYS(arch_prctl), SCMP_SYS(brk), SCMP_SYS(clock_getres), SCMP_SYS(clock_gettime),
+    SCMP_SYS(clock_nanosleep), SCMP_SYS(close), SCMP_SYS(dup), SCMP_SYS(exit), SCMP_SYS(exit_group),
+    SCMP_SYS(faccessat), SCMP_SYS(faccessat2), SCMP_SYS(fadvise64), SCMP_SYS(fstat), SCMP_SYS(fstatfs),
+    SCMP_SYS(futex), SCMP_SYS(getcpu), SCMP_SYS(getcwd), SCMP_SYS(getdents64), SCMP_SYS(getegid),
+    SCMP_SYS(geteuid), SCMP_SYS(getgid), SCMP_SYS(getpid), SCMP_SYS(getppid), SCMP_SYS(getrandom),
+    SCMP_SYS(getrlimit), SCMP_SYS(getrusage), SCMP_SYS(gettid), SCMP_SYS(gettimeofday), SCMP_SYS(getuid),
+    SCMP_SYS(lseek), SCMP_SYS(lstat), SCMP_SYS(madvise), SCMP_SYS(membarrier), SCMP_SYS(mmap),
+    SCMP_SYS(mprotect), SCMP_SYS(mremap), SCMP_SYS(munmap), SCMP_SYS(nanosleep), SCMP_SYS(newfstatat),
+    SCMP_SYS(poll), SCMP_SYS(ppoll), SCMP_SYS(pread64), SCMP_SYS(preadv), SCMP_SYS(pwrite64), SCMP_SYS(read),
+    SCMP_SYS(readlink), SCMP_SYS(readlinkat), SCMP_SYS(readv), SCMP_SYS(restart_syscall), SCMP_SYS(rseq),
+    SCMP_SYS(rt_sigaction), SCMP_SYS(rt_sigprocmask), SCMP_SYS(rt_sigreturn), SCMP_SYS(sched_getaffinity),
+    SCMP_SYS(sched_yield), SCMP_SYS(set_robust_list), SCMP_SYS(set_tid_address), SCMP_SYS(sigaltstack),
+    SCMP_SYS(stat), SCMP_SYS(statx), SCMP_SYS(sysinfo), SCMP_SYS(uname), SCMP_SYS(write), SCMP_SYS(writev));
 
-/* Of fcntl(): not the ones that send signals (F_SETOWN, F_SETSIG, F_NOTIFY). */
-static const int allowed_of_descriptors[] = {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL};
+/* Commands of fcntl(), without those that send signals (F_SETOWN, F_SETSIG, F_NOTIFY). */
+static const int allowed_commands[] = {F_DUPFD, F_DUPFD_CLOEXEC, F_GETFD, F_SETFD, F_GETFL};
 
-/* Calls that depend on an argument: opening for reading, threads of this process, limits that are asked for,
- * and signals to itself (abort). */
+/* Allows some calls with some arguments: opening for reading, beginning threads, reading limits, and signals
+ * to itself (abort). */
 static int add_conditional(scmp_filter_ctx filter) {
     const scmp_datum_t writes = O_ACCMODE | O_CREAT | O_TRUNC | O_APPEND | (O_TMPFILE & ~O_DIRECTORY);
     const scmp_datum_t self = (scmp_datum_t)getpid();
@@ -218,18 +164,18 @@ static int add_conditional(scmp_filter_ctx filter) {
     failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(tgkill), 1, SCMP_A0(SCMP_CMP_EQ, self, 0));
     failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(prlimit64), 2, SCMP_A0(SCMP_CMP_EQ, 0, 0),
                                SCMP_A2(SCMP_CMP_EQ, 0, 0));
-    for (size_t i = 0; i < sizeof allowed_of_descriptors / sizeof allowed_of_descriptors[0]; ++i) {
+    for (size_t i = 0; i < sizeof allowed_commands / sizeof allowed_commands[0]; ++i) {
         failed |= seccomp_rule_add(filter, SCMP_ACT_ALLOW, SCMP_SYS(fcntl), 1,
-                                   SCMP_A1(SCMP_CMP_EQ, (scmp_datum_t)allowed_of_descriptors[i], 0));
+                                   SCMP_A1(SCMP_CMP_EQ, (scmp_datum_t)allowed_commands[i], 0));
     }
-    /* its arguments lie in memory, where no filter sees them: the C library falls back to clone */
+    /* a filter cannot see arguments in memory: without clone3, the C library calls clone */
     failed |= seccomp_rule_add(filter, SCMP_ACT_ERRNO(ENOSYS), SCMP_SYS(clone3), 0);
     return failed;
 }
 
-/* The kernel puts the filter into every thread or into none, those that libraries have begun before main too:
- * a filter of one thread is none, as that thread may write over the stack of another. Calls of another kind
- * of machine (32 bit, x32) end the process, and not a thread that others may wait for. */
+/* The kernel filters every thread or none, also those that libraries have begun before main: a filtered
+ * thread could write to the stack of one without a filter. Calls of other machines (32 bit, x32) end the
+ * process, not only a thread that others may wait for. */
 bool vshi_confine_calls(void) {
     const scmp_filter_ctx filter = VSHI_SANITIZED ? NULL : seccomp_init(SCMP_ACT_ERRNO(EPERM));
     if (filter == NULL) {
@@ -238,7 +184,7 @@ bool vshi_confine_calls(void) {
     int failed = seccomp_attr_set(filter, SCMP_FLTATR_ACT_BADARCH, SCMP_ACT_KILL_PROCESS);
     failed |= seccomp_attr_set(filter, SCMP_FLTATR_CTL_TSYNC, 1);
     for (size_t i = 0; i < sizeof allowed / sizeof allowed[0]; ++i) {
-        /* a call that this kind of machine does not have is none to allow */
+        /* EDOM: this machine has no such call */
         const int added = seccomp_rule_add(filter, SCMP_ACT_ALLOW, allowed[i], 0);
         failed |= added == -EDOM ? 0 : added;
     }
@@ -248,8 +194,8 @@ bool vshi_confine_calls(void) {
     return loaded;
 }
 
-/* --- files, by Landlock (Linux 5.13): by the numbers of its system calls, as the C library has no functions
- * for them and headers of this age lack some of the rights (linux/landlock.h) */
+/* --- files, by Landlock (Linux 5.13). The C library has no functions for it, and older headers lack some of
+ * the rights (linux/landlock.h). */
 
 #ifndef SYS_landlock_create_ruleset
 #define SYS_landlock_create_ruleset 444
@@ -259,12 +205,12 @@ bool vshi_confine_calls(void) {
 
 enum { ASK_VERSION = 1, RULE_PATH_BENEATH = 1 };
 
-/* Rights of files, bits. */
+/* Bits: rights to files. */
 enum {
     EXECUTE = 1 << 0,
     READ_FILE = 1 << 2,
     READ_FOLDER = 1 << 3,
-    ALL_OF_1 = (1 << 13) - 1, /* with writing, making, removing */
+    ALL_OF_1 = (1 << 13) - 1, /* version 1: also writing, making, removing */
     REFER = 1 << 13,          /* from version 2 */
     TRUNCATE = 1 << 14,       /* from version 3 */
     DEVICE_CALLS = 1 << 15    /* ioctl(), from version 5 */
@@ -287,7 +233,7 @@ int vshi_landlock_version(void) {
 }
 
 /* Ignores missing files. */
-static void allow(int ruleset, const char *path) {
+static void allow_path(int ruleset, const char *path) {
     const int file = open(path, O_PATH | O_CLOEXEC);
     struct stat status;
     if (file >= 0 && fstat(file, &status) == 0) {
@@ -299,14 +245,14 @@ static void allow(int ruleset, const char *path) {
     }
 }
 
-/* Each folder of a list as LD_LIBRARY_PATH is one. */
+/* Allows each folder of a list like LD_LIBRARY_PATH. */
 static void allow_list(int ruleset, const char *list) {
     while (list != NULL && *list != '\0') {
         char path[PATH_MAX];
         const size_t length = strcspn(list, ":;");
         if (length > 0 && length < sizeof path) {
             snprintf(path, sizeof path, "%.*s", (int)length, list);
-            allow(ruleset, path);
+            allow_path(ruleset, path);
         }
         list += length + (list[length] != '\0');
     }
@@ -320,33 +266,33 @@ static void allow_libraries(int ruleset, const vshi_request *request) {
                                           "/proc/meminfo",  "/dev/null",
                                           "/dev/urandom"};
     for (size_t i = 0; i < sizeof folders / sizeof folders[0]; ++i) {
-        allow(ruleset, folders[i]);
+        allow_path(ruleset, folders[i]);
     }
     for (size_t i = 0; i < request->folder_count; ++i) {
-        allow(ruleset, request->folders[i]);
+        allow_path(ruleset, request->folders[i]);
     }
     allow_list(ruleset, getenv("LD_LIBRARY_PATH"));
     allow_list(ruleset, getenv("LD_PRELOAD"));
 }
 
-/* A model names other files in its folder. All other kinds are one file. */
+/* A model names other files in its folder. All other kinds of inputs are one file. */
 static void allow_inputs(int ruleset, const vshi_request *request) {
     char folder[PATH_MAX];
-    allow(ruleset, request->path);
+    allow_path(ruleset, request->path);
     if (request->kind != VSHI_READ_MODEL && request->kind != VSHI_READ_DRACO) {
         return;
     }
     const char *slash = strrchr(request->path, '/');
     const size_t length = slash != NULL ? (size_t)(slash - request->path) + 1 : 0;
     if (request->outside) {
-        allow(ruleset, "/");
+        allow_path(ruleset, "/");
     } else if (length < sizeof folder) {
         snprintf(folder, sizeof folder, "%.*s", (int)length, request->path);
-        allow(ruleset, length > 0 ? folder : ".");
-        /* and where it is a link, as vshi_input_is_beside() has it */
+        allow_path(ruleset, length > 0 ? folder : ".");
+        /* for a link also its target's folder, as vshi_input_is_beside() */
         if (realpath(request->path, folder) != NULL) {
             *strrchr(folder, '/') = '\0';
-            allow(ruleset, folder[0] != '\0' ? folder : "/");
+            allow_path(ruleset, folder[0] != '\0' ? folder : "/");
         }
     }
 }
@@ -367,7 +313,7 @@ static bool confine_files(const vshi_request *request, bool start) {
     all.files &= start ? ~(uint64_t)EXECUTE : UINT64_MAX;
     all.network = version >= 4 ? TCP : 0;
     all.scopes = version >= 6 ? ALONE : 0;
-    /* a kernel that knows less takes a longer struct whose rest is 0 */
+    /* older kernels accept a longer struct if the rest is 0 */
     const int ruleset = (int)syscall(SYS_landlock_create_ruleset, &all, sizeof all, 0);
     if (ruleset < 0) {
         return false;
@@ -382,12 +328,12 @@ static bool confine_files(const vshi_request *request, bool start) {
 
 /* --- all of it */
 
-/* Words behind VSH_READER_ARGUMENT, of a reader to itself and to the library that it loads. */
+/* Words after VSH_READER_ARGUMENT: from a reader to itself, and to the library that it loads. */
 static const char again[] = "again";
-static const char held[] = VSHI_READER_HELD;
+static const char confined_word[] = VSHI_READER_CONFINED;
 
-/* The threads that libraries have begun before main are none of this thread's, which Landlock would hold for:
- * where this program is started once more they come after it, and it holds for them, too. */
+/* Landlock confines this thread and its later threads, but not those that libraries have begun before main.
+ * So the program starts again under Landlock, and then it confines them too. */
 static void start_again(char **argv, const vshi_request *request) {
     char argument[] = VSH_READER_ARGUMENT, word[sizeof again];
     memcpy(word, again, sizeof again);
@@ -397,25 +343,25 @@ static void start_again(char **argv, const vshi_request *request) {
     }
 }
 
-static bool files_are_limited(void) {
+static bool has_file_limit(void) {
     struct rlimit size;
     return getrlimit(RLIMIT_FSIZE, &size) == 0 && size.rlim_cur != RLIM_INFINITY;
 }
 
-/* Data (heap, stacks, what libraries write to) that reading a small file takes, whatever it holds, and 50
- * MiB: most of it is never touched. OpenImageIO brings the libraries of all its formats, and their threads.
+/* Returns the bytes of data (heap, stacks, variables of libraries) for reading any small file, and 50 MiB
+ * more. Most of it is never touched. OpenImageIO loads the libraries of all its formats, and their threads.
  */
-static uint64_t data_beside(const vshi_request *request) {
+static uint64_t find_base_data(const vshi_request *request) {
     return (uint64_t)(request->kind == VSHI_READ_IMAGE ? 176 : 68) << 20;
 }
 
 static void confine(const vshi_request *request, bool files, vshi_reader_state *state) {
-    state->cramped = files_are_limited();
-    if (vshi_confine_resources(request->memory, data_beside(request), request->seconds)) {
+    state->cramped = has_file_limit();
+    if (vshi_confine_resources(request->memory, find_base_data(request), request->seconds)) {
         state->confined |= VSH_CONFINED_LIMITS;
     }
     if ((uint64_t)getppid() != request->parent) {
-        state->code = VSHI_READER_CANNOT; /* it died before its death would have been ours */
+        state->code = VSHI_READER_CANNOT; /* the parent died before PR_SET_PDEATHSIG */
         return;
     }
     if (VSHI_SANITIZED) {
@@ -429,10 +375,10 @@ static void confine(const vshi_request *request, bool files, vshi_reader_state *
     }
 }
 
-/* Reads the word in which vdbshade-reader says how it is confined. */
-static vshi_reader_state take_held(const char *word) {
-    const int told = atoi(word);
-    return (vshi_reader_state){(uint32_t)told & VSH_CONFINED_ALL, (told & VSHI_HELD_FILE_LIMIT) != 0, -1};
+/* Reads the bits that vdbshade-reader sends: how it is confined. */
+static vshi_reader_state parse_confined(const char *word) {
+    const int bits = atoi(word);
+    return (vshi_reader_state){(uint32_t)bits & VSH_CONFINED_ALL, (bits & VSHI_CONFINED_FILE_LIMIT) != 0, -1};
 }
 
 vshi_answer_head vshi_reader_head(const vshi_reader_state *state, int32_t code) {
@@ -446,7 +392,7 @@ bool vshi_reader_answer(const vshi_answer_head *head) {
     return pwrite(VSHI_READER_ANSWER, head, sizeof *head, 0) == (ssize_t)sizeof *head;
 }
 
-int vshi_reader_tell(const vshi_reader_state *state) {
+int vshi_reader_answer_confinement(const vshi_reader_state *state) {
     const vshi_answer_head head = vshi_reader_head(state, VSH_OK);
     return vshi_reader_answer(&head) ? 0 : VSHI_READER_CANNOT;
 }
@@ -463,8 +409,8 @@ static void refuse(const vshi_request *request, vshi_reader_state *state) {
 vshi_reader_state vshi_reader_begin(int argc, char **argv, const vshi_request *request) {
     const char *word = argc > 2 ? argv[2] : "";
     vshi_reader_state state = {0, false, -1};
-    if (strncmp(word, held, sizeof held - 1) == 0) {
-        return take_held(word + sizeof held - 1);
+    if (strncmp(word, confined_word, sizeof confined_word - 1) == 0) {
+        return parse_confined(word + sizeof confined_word - 1);
     }
     const bool started_again = strcmp(word, again) == 0;
     const bool alone = vshi_task_count() == 1;

@@ -19,7 +19,7 @@ void vshi_encoder_begin(vshi_encoder *encoder, int file, uint64_t offset) {
 
 enum { CHECK_EVERY = 1 << 20 }; /* bytes */
 
-/* The resident memory that getrusage() tells is no less than that of whoever started this process. */
+/* Asks malloc(): the resident memory of getrusage() also counts the process that started this one. */
 static bool has_room(vshi_encoder *encoder, uint64_t size) {
     if (encoder->room == 0 || size < encoder->checked + CHECK_EVERY) {
         return true;
@@ -29,7 +29,7 @@ static bool has_room(vshi_encoder *encoder, uint64_t size) {
     return heap.uordblks + heap.hblkhd + size <= encoder->room;
 }
 
-static void write_out(vshi_encoder *encoder, const unsigned char *bytes, size_t size, uint64_t offset) {
+static void write_bytes(vshi_encoder *encoder, const unsigned char *bytes, size_t size, uint64_t offset) {
     if (encoder->error == 0 && !has_room(encoder, offset + size)) {
         encoder->error = ENOMEM;
     }
@@ -46,17 +46,17 @@ static void write_out(vshi_encoder *encoder, const unsigned char *bytes, size_t 
 }
 
 bool vshi_encoder_flush(vshi_encoder *encoder) {
-    write_out(encoder, encoder->buffer, encoder->used, encoder->size - encoder->used);
+    write_bytes(encoder, encoder->buffer, encoder->used, encoder->size - encoder->used);
     encoder->used = 0;
     return encoder->error == 0;
 }
 
-static void put_bytes(vshi_encoder *encoder, const void *bytes, size_t size) {
+static void append_bytes(vshi_encoder *encoder, const void *bytes, size_t size) {
     if (size > VSHI_ENCODER_BUFFER - encoder->used) {
         vshi_encoder_flush(encoder);
     }
     if (size > VSHI_ENCODER_BUFFER) {
-        write_out(encoder, bytes, size, encoder->size);
+        write_bytes(encoder, bytes, size, encoder->size);
     } else {
         memcpy(encoder->buffer + encoder->used, bytes, size);
         encoder->used += size;
@@ -66,19 +66,19 @@ static void put_bytes(vshi_encoder *encoder, const void *bytes, size_t size) {
 
 void vshi_encode_array(vshi_encoder *encoder, const void *array, size_t count, size_t size) {
     static const unsigned char zeros[ALIGNED];
-    const size_t bytes = count * size; /* of memory that is there */
+    const size_t bytes = count * size; /* the array exists, so this cannot overflow */
     if (bytes > 0) {
-        put_bytes(encoder, array, bytes);
-        put_bytes(encoder, zeros, (ALIGNED - bytes % ALIGNED) % ALIGNED);
+        append_bytes(encoder, array, bytes);
+        append_bytes(encoder, zeros, (ALIGNED - bytes % ALIGNED) % ALIGNED);
     }
 }
 
 void vshi_encode_count(vshi_encoder *encoder, uint64_t count) {
-    put_bytes(encoder, &count, sizeof count);
+    append_bytes(encoder, &count, sizeof count);
 }
 
 void vshi_encode_number(vshi_encoder *encoder, double number) {
-    put_bytes(encoder, &number, sizeof number);
+    append_bytes(encoder, &number, sizeof number);
 }
 
 void vshi_encode_text(vshi_encoder *encoder, const char *text) {

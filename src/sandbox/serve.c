@@ -1,4 +1,4 @@
-/* The reader's side: takes the request, limits itself, parses, answers. */
+/* A reader: reads the request, confines itself, parses, answers. */
 #include "base/clock.h"
 #include "sandbox/confine.h"
 
@@ -8,19 +8,19 @@
 #include <string.h>
 #include <unistd.h>
 
-enum { MOST_WARNINGS = 1 << 20 /* bytes of all that are passed on */ };
+enum { MOST_WARNINGS = 1 << 20 /* bytes of all warnings */ };
 
-/* Between two reports of progress, seconds. */
+/* Seconds between two reports of progress. */
 static const double report_interval = 0.01;
 
 typedef struct serving {
-    char *warnings; /* texts, one behind the other with their ends */
+    char *warnings; /* [count] texts, each with its NUL */
     size_t used, count;
     double reported;
     vshi_reader_state state;
 } serving;
 
-/* May come from any thread of the pool, one at a time. */
+/* Any thread of the pool may call this, one at a time. */
 static void keep_warning(void *user, const char *message) {
     serving *s = user;
     const size_t size = strlen(message) + 1;
@@ -31,8 +31,8 @@ static void keep_warning(void *user, const char *message) {
     }
 }
 
-/* The pipe blocks nobody: what finds no room is left out. */
-static int32_t report(void *user, const char *stage, double fraction) {
+/* The pipe does not block: a report without room is lost. */
+static int32_t report_progress(void *user, const char *stage, double fraction) {
     serving *s = user;
     (void)stage;
     const double seconds = vshi_seconds();
@@ -45,7 +45,7 @@ static int32_t report(void *user, const char *stage, double fraction) {
     return 0;
 }
 
-/* Bytes of the heap that a reader of anything takes, and more. */
+/* Bytes of the heap that every reader needs, and more. */
 static const uint64_t heap_slack = (uint64_t)16 << 20;
 
 static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decoder *request,
@@ -66,7 +66,7 @@ static int answer(serving *s, vshi_serve_fn *serve, const char *path, vshi_decod
         text += strlen(text) + 1;
     }
     if (!vshi_encoder_flush(&encoder)) {
-        /* the limit of file sizes is the caller's memory limit; a lower one (ulimit -f) is the host's */
+        /* the caller's memory limit is a limit of files; the host may have a lower one (ulimit -f) */
         return encoder.error != ENOMEM && s->state.cramped ? VSHI_READER_FILE_LIMIT
                                                            : VSHI_READER_OUT_OF_MEMORY;
     }
@@ -89,13 +89,13 @@ static int32_t serve_request(serving *s, vshi_serve_fn *const *servers, int argc
         return s->state.code;
     }
     if (request.kind == VSHI_READ_CONFINEMENT) {
-        return vshi_reader_tell(&s->state);
+        return vshi_reader_answer_confinement(&s->state);
     }
     vsh_run run = vsh_run_default();
     run.threads = 1;
     run.memory_limit = request.memory;
     run.allow_outside = request.outside;
-    run.progress = report;
+    run.progress = report_progress;
     run.warning = keep_warning;
     run.notes = 1; /* the client drops them if nobody wants them */
     run.user = s;

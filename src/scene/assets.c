@@ -5,16 +5,17 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "base/similarity.h"
-#include "base/suggest.h"
+#include "base/text.h"
+#include "base/vec.h"
 #include "heightfield/heights.h"
 #include "mesh/mesh.h"
 #include "model/model.h"
+#include "outline/outline.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <vdbshade/lit.h>
+#include <vdbshade/scene.h>
 
 /* --- files */
 
@@ -22,7 +23,7 @@ typedef enum file_kind { MODEL, GRID, HEIGHTS } file_kind;
 
 typedef struct vshi_asset_file {
     file_kind kind;
-    const char *path, *name; /* the scene's: not looked at when all is loaded; name: of a grid, or NULL */
+    const char *path, *name; /* the scene's, used while loading; name: of a grid, or NULL */
     vsh_model *model;
     vshi_masks *masks; /* of the model's textures */
     vsh_grid *grid;
@@ -75,25 +76,21 @@ static void free_heights(vsh_assets *assets) {
 
 #define OF_MATERIAL "material:" /* begins a pattern of materials */
 
-/* The name of the object of mesh `index`; of `materials`, that of material `index`. */
-static const char *name_at(const vsh_model *model, size_t index, bool materials) {
-    const vsh_mesh mesh = materials ? (vsh_mesh){.name = vsh_model_get_material(model, index).name}
-                                    : vsh_model_mesh(model, index, -1);
+/* Name `i` of a model: its meshes' objects come first, then its materials. */
+static const char *find_name(const vsh_model *model, size_t i) {
+    const size_t meshes = vsh_model_mesh_count(model);
+    const vsh_mesh mesh = i < meshes ? vsh_model_mesh(model, i, -1)
+                                     : (vsh_mesh){.name = vshi_model_get_material(model, i - meshes).name};
     return vshi_object_name(&mesh);
 }
 
-static size_t count_of(const vsh_model *model, bool materials) {
-    return materials ? vsh_model_material_count(model) : vsh_model_mesh_count(model);
-}
-
-/* "'floor', 'wall' and 12 more", without those that follow one of the same name. */
-static void list_names(const vsh_model *model, bool materials, char *text, size_t capacity) {
+/* Lists names as "'floor', 'wall' and 12 more". Equal names in a row count once. */
+static void list_names(const vsh_model *model, size_t first, size_t end, char *text, size_t capacity) {
     enum { LISTED = 8, ROOM = 40 };
-    const size_t count = count_of(model, materials);
     size_t used = 0, listed = 0, more = 0;
     const char *last = NULL;
-    for (size_t i = 0; i < count; ++i) {
-        const char *name = name_at(model, i, materials);
+    for (size_t i = first; i < end; ++i) {
+        const char *name = find_name(model, i);
         if (last != NULL && strcmp(last, name) == 0) {
             continue;
         }
@@ -109,7 +106,7 @@ static void list_names(const vsh_model *model, bool materials, char *text, size_
     }
 }
 
-/* The letters of a pattern or name, all small: case is what is mistaken most. */
+/* Copies the letters of a pattern or name in lower case: most mistakes are in the case. */
 static void fold(const char *from, bool pattern, char to[64]) {
     size_t length = 0;
     for (; *from != '\0' && length < 63; ++from) {
@@ -120,54 +117,51 @@ static void fold(const char *from, bool pattern, char to[64]) {
     to[length] = '\0';
 }
 
-/* The name that a pattern which matches nothing comes nearest to, or NULL: of an object (materials 0), then
- * of a material. */
-static const char *nearest_name(const vsh_model *model, int materials, const char *pattern) {
+/* Finds the name from `first` on that is nearest to a pattern without matches; NULL: none is near. */
+static const char *find_nearest(const vsh_model *model, size_t first, size_t end, const char *pattern) {
     char wanted[64], have[64];
     fold(pattern, true, wanted);
     const char *nearest = NULL;
     size_t least = SIZE_MAX;
-    for (; materials < 2; ++materials) {
-        for (size_t i = 0; i < count_of(model, materials != 0); ++i) {
-            fold(name_at(model, i, materials != 0), false, have);
-            size_t distance = vshi_edit_distance(wanted, have);
-            if (wanted[0] != '\0' && strstr(have, wanted) != NULL) {
-                distance = 0;
-            }
-            if (distance < least) {
-                least = distance;
-                nearest = name_at(model, i, materials != 0);
-            }
+    for (size_t i = first; i < end && wanted[0] != '\0'; ++i) {
+        fold(find_name(model, i), false, have);
+        const size_t distance = strstr(have, wanted) != NULL ? 0 : vshi_edit_distance(wanted, have);
+        if (distance < least) {
+            least = distance;
+            nearest = find_name(model, i);
         }
     }
-    return nearest != NULL && wanted[0] != '\0' && vshi_is_near(least, wanted) ? nearest : NULL;
+    return nearest != NULL && vshi_is_near(least, wanted) ? nearest : NULL;
 }
 
-vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
-                               vsh_error *error) {
+/* Fails because a pattern matches none of a model's meshes, and suggests names. */
+static vsh_result fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
+                                 vsh_error *error) {
     char names[600] = "", materials[300] = "";
-    list_names(model, false, names, sizeof names);
-    list_names(model, true, materials, sizeof materials);
-    const size_t prefix =
-        strncmp(pattern, OF_MATERIAL, sizeof OF_MATERIAL - 1) == 0 ? sizeof OF_MATERIAL - 1 : 0;
-    const char *near = nearest_name(model, prefix > 0, pattern + prefix);
+    const size_t meshes = vsh_model_mesh_count(model), end = meshes + vshi_model_material_count(model);
+    list_names(model, 0, meshes, names, sizeof names);
+    list_names(model, meshes, end, materials, sizeof materials);
+    const bool of_material = strncmp(pattern, OF_MATERIAL, strlen(OF_MATERIAL)) == 0;
+    pattern += of_material ? strlen(OF_MATERIAL) : 0;
+    const char *near = find_nearest(model, of_material ? meshes : 0, end, pattern);
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: no %s is named '%.100s'%s%.100s%s there are %s%s%s", path,
-                     prefix > 0 ? "material" : "object", pattern + prefix,
-                     near != NULL ? "; did you mean '" : ";", near != NULL ? near : "",
-                     near != NULL ? "'?" : "", names, materials[0] != '\0' ? ", and materials " : "",
-                     materials);
+                     of_material ? "material" : "object", pattern, near != NULL ? "; did you mean '" : ";",
+                     near != NULL ? near : "", near != NULL ? "'?" : "", names,
+                     materials[0] != '\0' ? ", and materials " : "", materials);
 }
 
-bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material) {
+/* Whether a pattern matches a mesh by its object's name, or by its `material`'s. Patterns match materials
+ * only if they match no object. */
+static bool is_matched(const vsh_mesh *mesh, const char *pattern, bool material) {
     vsh_mesh named = *mesh;
     if (material) {
         named.name = mesh->material_name;
         named.object_name = NULL;
     }
-    return (!material || named.name != NULL) && vsh_mesh_matches(&named, pattern) != 0;
+    return (!material || named.name != NULL) && vshi_mesh_matches(&named, pattern) != 0;
 }
 
-/* Sets those that a pattern matches to `value`: objects, or where none is called so, materials. */
+/* Sets the meshes that the patterns match to `value`, by objects, else by materials. */
 static vsh_result apply_patterns(const vsh_model *model, const char *path, const char *const *patterns,
                                  size_t count, unsigned char value, unsigned char *chosen, vsh_error *error) {
     for (size_t p = 0; p < count; ++p) {
@@ -178,22 +172,22 @@ static vsh_result apply_patterns(const vsh_model *model, const char *path, const
         for (int material = 0; material < 2 && !matched; ++material) {
             for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
                 const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-                if (vshi_mesh_is_meant(&mesh, patterns[p], material != 0)) {
+                if (is_matched(&mesh, patterns[p], material != 0)) {
                     chosen[i] = value;
                     matched = true;
                 }
             }
         }
         if (!matched) {
-            return vshi_fail_unmatched(model, path, patterns[p], error);
+            return fail_unmatched(model, path, patterns[p], error);
         }
     }
     return VSH_OK;
 }
 
-/* *chosen [mesh count]: 1 for each mesh that the selection means; to be freed, also after an error. `path` is
- * the model's, for messages. Errors: VSH_ERROR_INPUT where a pattern matches nothing (with names that it
- * might have meant) or nothing is left; VSH_ERROR_ARGUMENT where a pattern is NULL; VSH_ERROR_MEMORY. */
+/* Sets *chosen [mesh count] to 1 for each selected mesh; to be freed, also after an error. Errors:
+ * VSH_ERROR_INPUT (a pattern matches nothing, or no mesh is left); VSH_ERROR_ARGUMENT (a pattern is NULL);
+ * VSH_ERROR_MEMORY. */
 static vsh_result select_meshes(const vsh_model *model, const char *path, const vsh_selection *selection,
                                 unsigned char **chosen, vsh_error *error) {
     const size_t count = vsh_model_mesh_count(model);
@@ -202,8 +196,8 @@ static vsh_result select_meshes(const vsh_model *model, const char *path, const 
     VSHI_TRY(apply_patterns(model, path, selection->only, selection->only_count, 1, *chosen, error));
     VSHI_TRY(apply_patterns(model, path, selection->except, selection->except_count, 0, *chosen, error));
     if (memchr(*chosen, 1, count) == NULL) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: no object is left: all that are chosen are excepted, too", path);
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: no object is left: all chosen ones are excepted, too",
+                         path);
     }
     return VSH_OK;
 }
@@ -219,18 +213,16 @@ static vsh_result fail_without_uvs(const vsh_receiver *receiver, const char *mes
     if (sets == 0) {
         return vshi_fail(
             error, VSH_ERROR_INPUT,
-            "%s: %s: no UVs to bake into: have them made (--unwrap auto; \"unwrap\" in a scene), or "
-            "leave it out of what receives, so that it only casts (--no-receive NAME, "
-            "--per-object; \"except\" in a scene)",
+            "%s: %s: no UVs to bake into: make them (--unwrap auto; \"unwrap\" in a scene), or let the mesh "
+            "only cast (--no-receive NAME, --per-object; \"except\" in a scene)",
             receiver->path, mesh);
     }
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: %s: no UV set %d: it has %s%d", receiver->path, mesh,
                      receiver->uv_set, sets == 1 ? "set " : "sets 0 … ", sets - 1);
 }
 
-/* Takes those out of `chosen` that cannot receive, where the receiver is partial and not unwrapped; else
- * errors: VSH_ERROR_INPUT where a mesh has no UVs or not the set, VSH_ERROR_ARGUMENT where there is no such
- * set. */
+/* Checks that the chosen meshes have the UV set, unless they are unwrapped. A partial receiver leaves out
+ * those that lack it, with a warning. Errors: VSH_ERROR_INPUT; VSH_ERROR_ARGUMENT (the set's number). */
 static vsh_result select_uvs(const vsh_model *model, const vsh_receiver *receiver, const vsh_run *run,
                              unsigned char *chosen, vsh_error *error) {
     if (receiver->uv_set < -1 || receiver->uv_set >= VSH_MAX_UV_SETS) {
@@ -240,7 +232,7 @@ static vsh_result select_uvs(const vsh_model *model, const vsh_receiver *receive
     const size_t count = vsh_model_mesh_count(model);
     bool any = false;
     if (vshi_receiver_unwrap(receiver) != VSH_RECEIVER_UNWRAP_NEVER) {
-        return VSH_OK; /* which makes what is missing */
+        return VSH_OK;
     }
     for (size_t i = 0; i < count; ++i) {
         any = any ||
@@ -276,78 +268,72 @@ static void compose(const double outer[12], const double inner[12], double resul
     }
 }
 
-/* Adds a mesh: number `number` of a model, or a part of that. */
-static void add_mesh(vshi_asset_place *place, vsh_mesh mesh, size_t number, double scale,
-                     const double transform[12]) {
+/* Adds a mesh, or a part of it, with its number in the model. */
+static void add_mesh(vshi_asset_place *place, vsh_mesh mesh, size_t number) {
     double *composed = place->transforms + 12 * place->count, scaled[12];
     for (int k = 0; k < 12; ++k) {
-        scaled[k] = mesh.transform[k] * scale;
+        scaled[k] = mesh.transform[k] * place->scale;
     }
-    compose(transform, scaled, composed);
+    compose(place->transform, scaled, composed);
     mesh.transform = composed;
     place->numbers[place->count] = number;
     place->meshes[place->count++] = mesh;
 }
 
-static vsh_result allocate_meshes(vshi_asset_place *place, size_t count, vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&place->meshes, count, sizeof *place->meshes, "meshes", error));
-    VSHI_TRY(vshi_allocate((void **)&place->transforms, count, 12 * sizeof(double), "transforms", error));
-    return vshi_allocate((void **)&place->numbers, count, sizeof *place->numbers, "meshes", error);
-}
-
-static double scale_of(const vsh_model *model, double unit) {
+/* Makes room for `count` meshes of a model. `unit`: metres of its numbers; 0: as the model says. */
+static vsh_result prepare_place(vshi_asset_place *place, const vsh_model *model, size_t count, double unit,
+                                vsh_error *error) {
     const double own_unit = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
-    return unit > 0.0 ? unit / own_unit : 1.0;
+    const vshi_array arrays[] = {VSHI_ARRAY(place->meshes, count), VSHI_ARRAY(place->transforms, 12 * count),
+                                 VSHI_ARRAY(place->numbers, count)};
+    place->scale = unit > 0.0 ? unit / own_unit : 1.0;
+    return VSHI_ALLOCATE_ALL(arrays, "meshes", error);
 }
 
-/* Puts the meshes of the model that are `chosen` there; NULL: all. */
-static vsh_result place_chosen(vshi_asset_place *place, const vsh_model *model, const unsigned char *chosen,
-                               int32_t uv_set, double unit, const double transform[12], vsh_error *error) {
+/* Adds the chosen meshes of a model; NULL: all. */
+static vsh_result add_chosen(vshi_asset_place *place, const vsh_model *model, const unsigned char *chosen,
+                             int32_t uv_set, double unit, vsh_error *error) {
     const size_t all = vsh_model_mesh_count(model);
-    const double scale = scale_of(model, unit);
-    VSHI_TRY(allocate_meshes(place, all, error));
+    VSHI_TRY(prepare_place(place, model, all, unit, error));
     for (size_t i = 0; i < all; ++i) {
         if (chosen == NULL || chosen[i] != 0) {
-            add_mesh(place, vsh_model_mesh(model, i, uv_set), i, scale, transform);
+            add_mesh(place, vsh_model_mesh(model, i, uv_set), i);
         }
     }
     return VSH_OK;
 }
 
 /* Adds the chosen meshes as they cast. Meshes that `parts`, a receiver of the same model, has unwrapped come
- * from there, so that a mesh that casts and receives is one; NULL: none. A mesh that a mask cuts out keeps
- * the UVs of its texture. */
-static vsh_result add_casting(vshi_asset_place *place, vshi_masks *masks, const unsigned char *chosen,
-                              const vshi_asset_place *parts, double unit, const double transform[12],
-                              const vsh_run *run, vsh_error *error) {
+ * from there, so that a mesh that casts and receives is one; NULL: none. A mesh with holes keeps the UVs of
+ * its texture. */
+static vsh_result add_casting(vshi_asset_place *place, const unsigned char *chosen,
+                              const vshi_asset_place *parts, const vsh_run *run, vsh_error *error) {
     const vsh_model *model = place->model;
     const size_t all = vsh_model_mesh_count(model), part_count = parts != NULL ? parts->count : 0;
-    const double scale = scale_of(model, unit);
     unsigned char *left = NULL;
     vsh_result result;
-    VSHI_TRY_DONE(allocate_meshes(place, 2 * all + part_count, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&left, all, 1, "meshes", error));
     memcpy(left, chosen, all);
     for (size_t i = 0; i < part_count; ++i) {
         const size_t number = parts->numbers[i];
-        vshi_cast_views views = {.count = 0};
+        vshi_cast_views views = {.cut = true};
         if (chosen[number] != 0) {
-            VSHI_TRY_DONE(vshi_masks_cast(masks, number, run, &views, error));
+            VSHI_TRY_DONE(vshi_masks_cast(place->file->masks, number, run, &views, error));
         }
-        if (chosen[number] != 0 && !views.cut) {
+        if (!views.cut) {
             vsh_mesh part = parts->meshes[i];
             part.transform = vsh_model_mesh(model, number, -1).transform;
-            add_mesh(place, part, number, scale, transform);
+            add_mesh(place, part, number);
             left[number] = 0;
         }
     }
     for (size_t i = 0; i < all; ++i) {
         vshi_cast_views views = {.count = 0};
         if (left[i] != 0) {
-            VSHI_TRY_DONE(vshi_masks_cast(masks, i, run, &views, error));
+            VSHI_TRY_DONE(vshi_masks_cast(place->file->masks, i, run, &views, error));
         }
         for (int k = 0; k < views.count; ++k) {
-            add_mesh(place, views.meshes[k], i, scale, transform);
+            add_mesh(place, views.meshes[k], i);
         }
     }
 done:
@@ -355,31 +341,28 @@ done:
     return result;
 }
 
-/* Takes glass and the like out of `chosen`; what is a cut-out, though its material is blended, stays. */
-static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, const vsh_model *model,
-                                    const char *path, const vsh_run *run, unsigned char *chosen,
-                                    vsh_error *error) {
-    const size_t count = vsh_model_mesh_count(model);
+/* Leaves glass and the like out of `chosen`. Cut-outs stay, though their materials are blended. */
+static vsh_result leave_out_blended(const vsh_scene *scene, const vshi_asset_place *place, const vsh_run *run,
+                                    unsigned char *chosen, vsh_error *error) {
+    const char *path = place->file->path;
+    const size_t count = vsh_model_mesh_count(place->model);
     size_t left = 0, blended = 0, cut_out = 0;
     for (size_t i = 0; i < count; ++i) {
-        const int32_t alpha = vsh_model_mesh(model, i, -1).alpha;
-        bool out = chosen[i] != 0 && alpha == VSH_ALPHA_BLENDED && scene->cast_blended == 0;
-        vshi_blend blend = VSHI_BLEND_GLASS;
-        if (out) {
-            VSHI_TRY(vshi_masks_blend(masks, i, run, &blend, error));
+        if (chosen[i] != 0 && scene->cast_blended == 0 &&
+            vsh_model_mesh(place->model, i, -1).alpha == VSH_ALPHA_BLENDED) {
+            vshi_blend blend;
+            VSHI_TRY(vshi_masks_blend(place->file->masks, i, run, &blend, error));
+            cut_out += blend == VSHI_BLEND_CUT_OUT;
+            blended += blend == VSHI_BLEND_GLASS;
+            chosen[i] = blend != VSHI_BLEND_GLASS;
         }
-        out = out && blend == VSHI_BLEND_GLASS;
-        cut_out += blend == VSHI_BLEND_CUT_OUT;
-        blended += out;
-        chosen[i] = out ? 0 : chosen[i];
         left += chosen[i] != 0;
     }
     if (left == 0) {
-        return vshi_fail(
-            error, VSH_ERROR_INPUT,
-            "%s: all its materials are blended (glass, smoke), and cast nothing; \"cast_blended\" "
-            "in a scene, or --cast-blended, has them cast",
-            path);
+        return vshi_fail(error, VSH_ERROR_INPUT,
+                         "%s: all its materials are blended (glass, smoke), and cast nothing; "
+                         "\"cast_blended\" in a scene, or --cast-blended, has them cast",
+                         path);
     }
     if (blended > 0) {
         vshi_warn(run,
@@ -397,27 +380,28 @@ static vsh_result leave_out_blended(const vsh_scene *scene, vshi_masks *masks, c
     return VSH_OK;
 }
 
-/* Adds the meshes of the place's model that a mesh caster takes, as they cast. `parts` is a receiver that has
- * unwrapped meshes of the model, or NULL. Warns of blended meshes that do not cast. */
+/* Adds the meshes of a mesh caster, as they cast. `parts` is a receiver that has unwrapped meshes of the
+ * model, or NULL. */
 static vsh_result place_casting(vshi_asset_place *place, const vsh_scene *scene, const vsh_caster *caster,
                                 const vshi_asset_place *parts, const vsh_run *run, vsh_error *error) {
-    vshi_masks *masks = place->file->masks;
+    const size_t most = 2 * vsh_model_mesh_count(place->model) + (parts != NULL ? parts->count : 0);
     unsigned char *chosen = NULL, *one_sided = NULL;
     vsh_result result;
+    VSHI_TRY_DONE(prepare_place(place, place->model, most, scene->unit, error));
     VSHI_TRY_DONE(select_meshes(place->model, caster->path, &caster->objects, &chosen, error));
-    VSHI_TRY_DONE(leave_out_blended(scene, masks, place->model, caster->path, run, chosen, error));
+    VSHI_TRY_DONE(leave_out_blended(scene, place, run, chosen, error));
     VSHI_TRY_DONE(vshi_select_some(place->model, caster->path, caster->one_sided, caster->one_sided_count,
                                    &one_sided, error));
-    VSHI_TRY_DONE(add_casting(place, masks, chosen, parts, scene->unit, caster->transform, run, error));
+    VSHI_TRY_DONE(add_casting(place, chosen, parts, run, error));
     for (size_t i = 0; i < place->count; ++i) {
         place->meshes[i].one_sided = one_sided[place->numbers[i]];
     }
     if (place->count == 0) {
-        result = vshi_fail(error, VSH_ERROR_INPUT,
-                           "%s: the masks of its materials leave nothing of what is to cast", caster->path);
+        result = vshi_fail(error, VSH_ERROR_INPUT, "%s: the masks of its materials leave nothing to cast",
+                           caster->path);
     }
 done:
-    vshi_masks_trim(masks);
+    vshi_masks_trim(place->file->masks);
     free(one_sided);
     free(chosen);
     return result;
@@ -425,32 +409,26 @@ done:
 
 /* --- casters and receivers */
 
-/* A second side of 0 follows from the first, which is the longer one, by the cells. */
-static void settle_size(vsh_heights_source *source) {
-    const double across = source->columns - 1, down = source->rows - 1, longer = source->size[0];
-    if (source->size[1] == 0.0) {
-        source->size[0] = longer * fmin(1.0, across / down);
-        source->size[1] = longer * fmin(1.0, down / across);
-    }
-}
-
-/* `source` is filled but for what the image holds, and whether it is direct but for its transform. */
+/* Makes a place's model of an image of heights. `source` is filled except for the image's values. */
 static vsh_result place_heights(vsh_assets *assets, vshi_asset_place *place, vsh_heights_source *source,
-                                int32_t what, const size_t *texels, const double transform[12],
-                                const vsh_run *run, vsh_error *error) {
+                                int32_t what, const size_t *texels, const vsh_run *run, vsh_error *error) {
     vshi_asset_file *file;
     VSHI_TRY(read_file(assets, HEIGHTS, source->name, NULL, run, &file, error));
     source->columns = file->heights.columns;
     source->rows = file->heights.rows;
     source->values = file->heights.values;
-    settle_size(source);
+    if (source->size[1] == 0.0) { /* by the cells; the first side is the longer one */
+        const double across = source->columns - 1, down = source->rows - 1, longer = source->size[0];
+        source->size[0] = longer * fmin(1.0, across / down);
+        source->size[1] = longer * fmin(1.0, down / across);
+    }
     if (place->direct) {
         vsh_heights_source placed = *source;
-        placed.transform = transform;
-        VSHI_TRY(vsh_heights_create(&placed, run, &place->heights, error));
+        placed.transform = place->transform;
+        VSHI_TRY(vshi_heights_create(&placed, run, &place->heights, error));
     }
     VSHI_TRY(vshi_model_of_heights(source, what, texels, run, &place->made, error));
-    return place_chosen(place, place->made, NULL, 0, 0.0, transform, error);
+    return add_chosen(place, place->made, NULL, 0, 0.0, error);
 }
 
 static vsh_result place_spheres(vshi_asset_place *place, const vsh_caster *caster, size_t index,
@@ -460,12 +438,12 @@ static vsh_result place_spheres(vshi_asset_place *place, const vsh_caster *caste
     double *read = NULL;
     vsh_error why;
     if (caster->path != NULL) {
-        VSHI_TRY(vsh_spheres_read(caster->path, run, &read, &count, error));
+        VSHI_TRY(vshi_spheres_read(caster->path, run, &read, &count, error));
         spheres = read;
     }
     const vsh_result result =
-        vsh_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
-    vsh_spheres_list_free(read);
+        vshi_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
+    vshi_spheres_list_free(read);
     return result == VSH_OK ? VSH_OK
                             : vshi_fail(error, result, "caster %zu: %s%s%s", index,
                                         caster->path != NULL ? caster->path : "",
@@ -475,7 +453,7 @@ static vsh_result place_spheres(vshi_asset_place *place, const vsh_caster *caste
 /* The first receiver that unwraps meshes of a model; NULL: none. */
 static const vshi_asset_place *find_unwrapped(const vsh_assets *assets, const vsh_model *model) {
     for (size_t i = 0; i < assets->receiver_count; ++i) {
-        if (assets->receivers[i].model == model && assets->receivers[i].unwrapped.atlas != NULL) {
+        if (assets->receivers[i].model == model && assets->receivers[i].pages.atlas != NULL) {
             return &assets->receivers[i];
         }
     }
@@ -494,6 +472,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
                          caster->type, VSH_CASTER_TEXT);
     }
     place->direct = vshi_caster_is_direct(scene, caster);
+    place->transform = caster->transform;
     if (caster->type == VSH_CASTER_SPHERES) {
         return place_spheres(place, caster, index, run, error);
     }
@@ -506,25 +485,25 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
         return VSH_OK;
     }
     if (caster->type == VSH_CASTER_MASK) {
-        return vsh_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
+        return vshi_outline_from_image(caster->path, &caster->mask, run, &place->outline, error);
     }
     if (caster->type == VSH_CASTER_TEXT) {
-        return vsh_outline_from_text(caster->text, caster->path, &caster->letters, run, &place->outline,
-                                     error);
+        return vshi_outline_from_text(caster->text, caster->path, &caster->letters, run, &place->outline,
+                                      error);
     }
     if (caster->type == VSH_CASTER_HEIGHTFIELD) {
         vsh_heights_source source = {.name = caster->path,
                                      .size = {caster->size[0], caster->size[1]},
                                      .height = caster->height,
                                      .base = caster->base};
-        return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, NULL, caster->transform, run, error);
+        return place_heights(assets, place, &source, VSH_HEIGHTS_SOLID, NULL, run, error);
     }
     VSHI_TRY(read_file(assets, MODEL, caster->path, NULL, run, &place->file, error));
     place->model = place->file->model;
     return place_casting(place, scene, caster, find_unwrapped(assets, place->model), run, error);
 }
 
-/* A heightfield of four heights, all 0. */
+/* A plane is a heightfield of four heights, all 0. */
 static vsh_result place_plane(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                               vsh_error *error) {
     static const float flat[4] = {0.0f, 0.0f, 0.0f, 0.0f};
@@ -534,7 +513,7 @@ static vsh_result place_plane(vshi_asset_place *place, const vsh_receiver *recei
                                        .values = flat,
                                        .size = {receiver->extent[0], receiver->extent[1]}};
     VSHI_TRY(vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &place->made, error));
-    return place_chosen(place, place->made, NULL, 0, 0.0, receiver->transform, error);
+    return add_chosen(place, place->made, NULL, 0, 0.0, error);
 }
 
 static vsh_result place_terrain(vsh_assets *assets, vshi_asset_place *place, const vsh_receiver *receiver,
@@ -545,8 +524,22 @@ static vsh_result place_terrain(vsh_assets *assets, vshi_asset_place *place, con
     const size_t samples = receiver->supersample > 1 ? (size_t)receiver->supersample : 1;
     const size_t texels[2] = {samples * (size_t)receiver->width, samples * (size_t)receiver->height};
     const bool sized = receiver->width > 0 && receiver->height > 0 && !vsh_lit_is_output(receiver->output);
-    return place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, sized ? texels : NULL,
-                         receiver->transform, run, error);
+    return place_heights(assets, place, &source, VSH_HEIGHTS_SURFACE, sized ? texels : NULL, run, error);
+}
+
+/* Adds the chosen meshes of a file. */
+static vsh_result place_receiving(vsh_assets *assets, vshi_asset_place *place, const vsh_scene *scene,
+                                  const vsh_receiver *receiver, const vsh_run *run, vsh_error *error) {
+    unsigned char *chosen = NULL;
+    vsh_result result;
+    VSHI_TRY(read_file(assets, MODEL, receiver->path, NULL, run, &place->file, error));
+    place->model = place->file->model;
+    VSHI_TRY_DONE(select_meshes(place->model, receiver->path, &receiver->objects, &chosen, error));
+    VSHI_TRY_DONE(select_uvs(place->model, receiver, run, chosen, error));
+    result = add_chosen(place, place->model, chosen, receiver->uv_set, scene->unit, error);
+done:
+    free(chosen);
+    return result;
 }
 
 static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, size_t index, const vsh_run *run,
@@ -556,24 +549,12 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
     if (receiver->path == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "receiver %zu: no path", index);
     }
-    const bool plane = receiver->type == VSH_RECEIVER_PLANE;
-    if (plane || receiver->type == VSH_RECEIVER_HEIGHTFIELD) {
-        VSHI_TRY(plane ? place_plane(place, receiver, run, error)
-                       : place_terrain(assets, place, receiver, run, error));
-        return vshi_place_pages(place, receiver, run, error);
-    }
-    unsigned char *chosen = NULL;
-    vsh_result result;
-    VSHI_TRY(read_file(assets, MODEL, receiver->path, NULL, run, &place->file, error));
-    const vsh_model *model = place->model = place->file->model;
-    VSHI_TRY_DONE(select_meshes(model, receiver->path, &receiver->objects, &chosen, error));
-    VSHI_TRY_DONE(select_uvs(model, receiver, run, chosen, error));
-    VSHI_TRY_DONE(
-        place_chosen(place, model, chosen, receiver->uv_set, scene->unit, receiver->transform, error));
-    result = vshi_place_pages(place, receiver, run, error);
-done:
-    free(chosen);
-    return result;
+    place->transform = receiver->transform;
+    VSHI_TRY(receiver->type == VSH_RECEIVER_PLANE ? place_plane(place, receiver, run, error)
+             : receiver->type == VSH_RECEIVER_HEIGHTFIELD
+                 ? place_terrain(assets, place, receiver, run, error)
+                 : place_receiving(assets, place, scene, receiver, run, error));
+    return vshi_place_pages(place, receiver, run, error);
 }
 
 /* --- solids and sheets: the scene's rules decide, or the shape of the mesh */
@@ -597,7 +578,7 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
                 first = first == NULL && casters[i].model != NULL ? casters[i].file : first;
                 for (size_t m = 0; casters[i].model != NULL && m < casters[i].count; ++m) {
                     vsh_mesh *mesh = &casters[i].meshes[m];
-                    if (vshi_mesh_is_meant(mesh, rule->pattern, material != 0)) {
+                    if (is_matched(mesh, rule->pattern, material != 0)) {
                         mesh->solidity = mesh->mask != NULL ? VSH_SOLIDITY_SHELL : rule->solidity;
                         matched = true;
                     }
@@ -606,7 +587,7 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
         }
         if (!matched) {
             return first != NULL
-                       ? vshi_fail_unmatched(first->model, first->path, rule->pattern, error)
+                       ? fail_unmatched(first->model, first->path, rule->pattern, error)
                        : vshi_fail(error, VSH_ERROR_INPUT, "no object is named '%.100s': no caster is a mesh",
                                    rule->pattern);
         }
@@ -614,7 +595,7 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
     return VSH_OK;
 }
 
-/* Tells a receiver's meshes what is known of those that cast: the same triangles in the same place. */
+/* Gives a receiver's meshes the solidity of casters with the same triangles in the same place. */
 static void share_solidity(const vshi_mesh_set *casters, vshi_asset_place *receiver) {
     for (size_t i = 0; i < receiver->count; ++i) {
         vsh_mesh *mesh = &receiver->meshes[i];
@@ -630,8 +611,7 @@ static void share_solidity(const vshi_mesh_set *casters, vshi_asset_place *recei
     }
 }
 
-/* Applies the rules of solidity to the casters' meshes, makes one set of them all and finds what they are,
- * together. Their views know it then. */
+/* Applies the rules of solidity to the casters' meshes, then finds the solids and sheets of all together. */
 static vsh_result settle_solidity(vsh_assets *assets, const vsh_scene *scene, const vsh_run *run,
                                   vsh_error *error) {
     size_t count = 0;
@@ -682,52 +662,35 @@ static vsh_result check_receivers(vsh_assets *assets, const vsh_scene *scene, co
             place->meshes[m].checked = place->set.meshes[m].checked;
         }
         const bool shared = scene->receivers[i].atlas == VSH_ATLAS_SHARED;
-        if (shared && place->unwrapped.page_count > 1) { /* connected meshes may be on several pages */
+        if (shared && place->pages.count > 1) { /* connected meshes may be on several pages */
             VSHI_TRY(vshi_mesh_set_solve(&place->set, run, error));
         }
     }
     return VSH_OK;
 }
 
-/* Notes the triangles of zero area, which everything skips, of a file that is seen for the first time. The
- * voxeliser tells what is open. */
+/* Notes the triangles of zero area, which everything skips, once for each file. */
 static vsh_result check_triangles(const vshi_asset_place *place, const vsh_run *run, vsh_error *error) {
     if (place->model == NULL || place->file->checked) {
         return VSH_OK;
     }
-    const char *path = place->file->path;
     size_t sound = 0;
     place->file->checked = true;
     for (size_t i = 0; i < place->count; ++i) {
-        sound += place->meshes[i].triangle_count - place->meshes[i].checked->report.degenerate_triangles;
-    }
-    if (sound == 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: every triangle has zero area", path);
-    }
-    for (size_t i = 0; i < place->count; ++i) {
         const vsh_mesh *mesh = &place->meshes[i];
         const size_t skipped = mesh->checked->report.degenerate_triangles;
+        sound += mesh->triangle_count - skipped;
         if (skipped > 0) {
-            vshi_note(run, "%s: mesh '%s': %zu triangles of zero area are skipped", path,
+            vshi_note(run, "%s: mesh '%s': %zu triangles of zero area are skipped", place->file->path,
                       mesh->name != NULL ? mesh->name : "", skipped);
         }
     }
-    return VSH_OK;
+    return sound > 0
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_INPUT, "%s: every triangle has zero area", place->file->path);
 }
 
-/* --- all of it */
-
-static vsh_result allocate_places(vsh_assets *assets, const vsh_scene *scene, vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&assets->files, scene->caster_count + scene->receiver_count,
-                           sizeof *assets->files, "files", error));
-    VSHI_TRY(vshi_allocate((void **)&assets->casters, scene->caster_count, sizeof *assets->casters, "casters",
-                           error));
-    VSHI_TRY(vshi_allocate((void **)&assets->receivers, scene->receiver_count, sizeof *assets->receivers,
-                           "receivers", error));
-    assets->caster_count = scene->caster_count;
-    assets->receiver_count = scene->receiver_count;
-    return VSH_OK;
-}
+/* --- loading */
 
 /* `index` of the scene's "casters" or "receivers". A struct that was only zeroed has a transform of zeros. */
 static vsh_result check_transform(const double transform[12], const char *list, size_t index,
@@ -749,16 +712,6 @@ static vsh_result check_transform(const double transform[12], const char *list, 
     return VSH_OK;
 }
 
-static vsh_result check_transforms(const vsh_scene *scene, vsh_error *error) {
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        VSHI_TRY(check_transform(scene->receivers[i].transform, "receivers", i, error));
-    }
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        VSHI_TRY(check_transform(scene->casters[i].transform, "casters", i, error));
-    }
-    return VSH_OK;
-}
-
 vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                            vsh_error *error) {
     VSHI_FLOATS;
@@ -767,26 +720,35 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     VSHI_NEEDS(scene);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(check_transforms(scene, error));
-    vsh_assets *loaded = NULL;
-    VSHI_TRY(vshi_allocate((void **)&loaded, 1, sizeof *loaded, "assets", error));
-    vsh_result result = VSH_OK;
-    VSHI_TRY_DONE(allocate_places(loaded, scene, error));
-    /* Receivers first: what is wrong with them is cheaper to find than a caster's volume is to read. */
     for (size_t i = 0; i < scene->receiver_count; ++i) {
-        VSHI_TRY_DONE(place_receiver(loaded, scene, i, &full, error));
+        VSHI_TRY(check_transform(scene->receivers[i].transform, "receivers", i, error));
     }
     for (size_t i = 0; i < scene->caster_count; ++i) {
+        VSHI_TRY(check_transform(scene->casters[i].transform, "casters", i, error));
+    }
+    vsh_assets *loaded = NULL;
+    VSHI_TRY(vshi_allocate((void **)&loaded, 1, sizeof *loaded, "assets", error));
+    const size_t casters = scene->caster_count, receivers = scene->receiver_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(loaded->files, casters + receivers),
+                                 VSHI_ARRAY(loaded->casters, casters),
+                                 VSHI_ARRAY(loaded->receivers, receivers)};
+    vsh_result result;
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "assets", error));
+    loaded->caster_count = casters;
+    loaded->receiver_count = receivers;
+    /* receivers first: their errors are cheaper to find than a caster's volume is to read */
+    for (size_t i = 0; i < receivers; ++i) {
+        VSHI_TRY_DONE(place_receiver(loaded, scene, i, &full, error));
+    }
+    for (size_t i = 0; i < casters; ++i) {
         VSHI_TRY_DONE(place_caster(loaded, scene, i, &full, error));
     }
     free_heights(loaded);
     VSHI_TRY_DONE(settle_solidity(loaded, scene, &full, error));
     VSHI_TRY_DONE(check_receivers(loaded, scene, &full, error));
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        VSHI_TRY_DONE(check_triangles(&loaded->casters[i], &full, error));
-    }
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        VSHI_TRY_DONE(check_triangles(&loaded->receivers[i], &full, error));
+    for (size_t i = 0; i < casters + receivers; ++i) {
+        VSHI_TRY_DONE(check_triangles(i < casters ? &loaded->casters[i] : &loaded->receivers[i - casters],
+                                      &full, error));
     }
     *assets = loaded;
     loaded = NULL;
@@ -797,11 +759,11 @@ done:
 
 static void free_places(vshi_asset_place *places, size_t count) {
     for (size_t i = 0; i < count; ++i) {
-        vsh_spheres_free(places[i].spheres);
-        vsh_heights_free(places[i].heights);
+        vshi_spheres_free(places[i].spheres);
+        vshi_heights_free(places[i].heights);
         vsh_model_free(places[i].made);
         vshi_mesh_set_free(&places[i].set);
-        vshi_unwrapped_free(&places[i].unwrapped);
+        vshi_receiver_pages_free(&places[i].pages);
         free(places[i].numbers);
         free(places[i].transforms);
         free(places[i].meshes);
@@ -827,7 +789,7 @@ void vsh_assets_free(vsh_assets *assets) {
     free(assets);
 }
 
-/* --- what is loaded */
+/* --- loaded assets */
 
 const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t index) {
     static const vshi_asset_place none;
@@ -844,62 +806,61 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
     return place->meshes;
 }
 
-const vsh_heights *vsh_assets_heights(const vsh_assets *assets, size_t index) {
+const vshi_heights *vshi_assets_heights(const vsh_assets *assets, size_t index) {
     return vshi_assets_caster(assets, index)->heights;
 }
 
-const vsh_spheres *vsh_assets_spheres(const vsh_assets *assets, size_t index) {
+const vshi_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index) {
     const vshi_asset_place *place = vshi_assets_caster(assets, index);
     return place->direct ? place->spheres : NULL;
 }
 
-static const vshi_asset_place *receiver_at(const vsh_assets *assets, size_t index) {
+static const vshi_asset_place *find_receiver(const vsh_assets *assets, size_t index) {
     static const vshi_asset_place none;
     return index < assets->receiver_count ? &assets->receivers[index] : &none;
 }
 
 const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
-    const vshi_asset_place *place = receiver_at(assets, index);
+    const vshi_asset_place *place = find_receiver(assets, index);
     *mesh_count = place->count;
     return place->meshes;
 }
 
-const vsh_model *vsh_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const vshi_asset_place *place = receiver_at(assets, index);
+const vsh_model *vshi_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
+    const vshi_asset_place *place = find_receiver(assets, index);
     *numbers = place->numbers;
     return place->made != NULL ? place->made : place->model;
 }
 
-const vsh_atlas *vsh_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const vshi_unwrapped *made = &receiver_at(assets, index)->unwrapped;
-    *numbers = made->numbers;
-    return made->atlas;
+const vsh_atlas *vshi_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers) {
+    const vshi_receiver_pages *pages = &find_receiver(assets, index)->pages;
+    *numbers = pages->atlas_numbers;
+    return pages->atlas;
 }
 
-size_t vsh_assets_receiver_pages(const vsh_assets *assets, size_t index) {
-    const vshi_unwrapped *made = &receiver_at(assets, index)->unwrapped;
-    return made->page_begins != NULL ? made->page_count : index < assets->receiver_count;
+size_t vshi_assets_receiver_pages(const vsh_assets *assets, size_t index) {
+    return find_receiver(assets, index)->pages.count;
 }
 
-int32_t vsh_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
-                                      vsh_receiver_page *info) {
-    if (page >= vsh_assets_receiver_pages(assets, index)) {
+int32_t vshi_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
+                                       vshi_receiver_page *info) {
+    const vshi_receiver_pages *pages = &find_receiver(assets, index)->pages;
+    if (page >= pages->count) {
         return 0;
     }
-    const vshi_unwrapped *made = &receiver_at(assets, index)->unwrapped;
-    *info = made->pages != NULL ? made->pages[page] : made->whole;
+    *info = pages->list[page];
     return 1;
 }
 
-const vsh_mesh *vsh_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
-                                         size_t *mesh_count) {
+const vsh_mesh *vshi_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
+                                          size_t *mesh_count) {
+    const vshi_asset_place *place = find_receiver(assets, index);
+    const size_t *begins = place->pages.begins;
     *first = *mesh_count = 0;
-    if (page >= vsh_assets_receiver_pages(assets, index)) {
+    if (page >= place->pages.count) {
         return NULL;
     }
-    const vshi_asset_place *place = receiver_at(assets, index);
-    const size_t *begins = place->unwrapped.page_begins;
-    *first = begins != NULL ? begins[page] : 0;
-    *mesh_count = (begins != NULL ? begins[page + 1] : place->count) - *first;
+    *first = begins[page];
+    *mesh_count = begins[page + 1] - begins[page];
     return place->meshes + *first;
 }

@@ -3,47 +3,137 @@
 #ifndef VSHI_ASSETS_H
 #define VSHI_ASSETS_H
 
+#include "heightfield/heights.h"
 #include "mesh/mesh_set.h"
+#include "spheres/spheres.h"
+#include "trace/trace.h"
 
 #include <stdbool.h>
-#include <string.h>
+#include <vdbshade/lightmap.h>
 #include <vdbshade/scene.h>
-#include <vdbshade/unwrap.h>
 
-/* A receiver's meshes with lightmap UVs that were made for them: cut along their charts, and on pages. Parts
- * are whole meshes, but for those that lie on several pages, which have a part on each, all of one object.
- * They are sorted by their pages, and stand in the meshes' order on each. */
-typedef struct vshi_unwrapped {
-    vsh_atlas *atlas; /* NULL: nothing was unwrapped, and all but the pages is 0 */
-    vsh_mesh *parts;  /* [part_count]: views of the memory below, with the meshes' own transforms; NULL when
-                         they were moved */
-    size_t *numbers;  /* [part_count]: which of the meshes each is a part of */
-    size_t part_count;
-    size_t *page_begins; /* [page_count + 1]: first part of each page, or first mesh where nothing was
-                            unwrapped; NULL: all are on one, `whole` */
-    size_t page_count;
-    vsh_receiver_page *pages; /* [page_count] */
-    vsh_receiver_page whole;
-    uint32_t *memory; /* of the parts' positions, normals and indices, of which so many elements are used */
-    size_t used;
-} vshi_unwrapped;
+/* The lights of a model's file (vshi_model_get_light()) as those of a scene. Lights of files have no size:
+ * directional ones get `angle` (angular diameter, radians, 0 … π, excluded), points, which become spheres,
+ * and spots `radius` (world units, ≥ 0) and VSH_FALLOFF_INVERSE_SQUARE. Colours are colour × intensity;
+ * ranges are not taken. A name is the model's with _ for what a light's cannot have ("light" where it has
+ * none), and _2, _3 … behind it where one before has it. `unit` as vsh_scene.unit. Free *lights, NULL where
+ * *count is 0, with vsh_lights_free(). Safe for one model in any number of threads. Errors:
+ * VSH_ERROR_ARGUMENT (NULL, an angle, a radius or a unit out of range, a light whose place is then none that
+ * lights can have), VSH_ERROR_MEMORY. */
+vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
+                                  vsh_light **lights, size_t *count, vsh_error *error);
+
+/* The model of receiver `index`, and which of its meshes each of the receiver's is: (*numbers)[mesh_count].
+ * They belong to the assets; NULL for an index beyond the scene's. */
+const vsh_model *vshi_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers);
+
+/* Pages of receiver `index`: 1 but where it is unwrapped and needs more, or has one for each object; 0 beyond
+ * the scene's. */
+size_t vshi_assets_receiver_pages(const vsh_assets *assets, size_t index);
+
+/* A page of a receiver; `object` belongs to the assets. */
+typedef struct vshi_receiver_page {
+    int32_t width; /* texels */
+    int32_t height;
+    const char *object; /* the name of the object whose it is, "" where it has none; NULL: it is shared */
+} vshi_receiver_page;
+
+/* Fills *page; false, and nothing changes, beyond what there is. */
+int32_t vshi_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
+                                       vshi_receiver_page *info);
+
+/* The meshes of vsh_assets_receiver() that lie on page `page`, which are some in a row of them: *first is the
+ * place of the first in that list. NULL and a count of 0 beyond what there is. */
+const vsh_mesh *vshi_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
+                                          size_t *mesh_count);
+
+/* Where it is unwrapped: its atlas, and which of the atlas's meshes each of vsh_assets_receiver() is, or a
+ * part of: (*numbers)[mesh_count]. They belong to the assets. Else NULL. */
+const vsh_atlas *vshi_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers);
+
+/* The heightfield that caster `index` marches, and the spheres that it casts without voxels. They belong to
+ * the assets. NULL for every other caster, and beyond the scene's. */
+const vshi_heights *vshi_assets_heights(const vsh_assets *assets, size_t index);
+const vshi_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index);
+
+/* The same of the casters in `layer`, of its voxel size, or (NULL) of those in none; *grid is NULL where
+ * there are none. Errors: as there; VSH_ERROR_ARGUMENT too where the scene has no such layer. */
+vsh_result vshi_scene_layer_casters(const vsh_scene *scene, const vsh_assets *assets,
+                                    const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
+                                    vsh_error *error);
+
+/* Makes a scene's casters in `layer`, or (NULL) in none, ready for rays of VSH_SHADOW_EXACT and VSH_AO_EXACT.
+ * Meshes and heightfields become triangles. Procedural shapes and spheres keep their exact form. Level sets,
+ * masks and texts become the surface of their own voxels. *triangles is NULL if there are no casters. Free
+ * the result with vshi_triangles_free(). Errors:
+ * - VSH_ERROR_ARGUMENT: scene, assets or triangles NULL, run;
+ * - VSH_ERROR_INPUT: a transform that shears or scales a shape or a level set unevenly;
+ * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
+ *   vshi_triangles_create_beside(), and for level sets vsh_grid_unite() and vshi_field_create(). */
+vsh_result vshi_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
+                                const vsh_scene_layer *layer, const vsh_run *run, vshi_triangles **triangles,
+                                vsh_error *error);
+
+/* 1 where auto traces the casters in `layer`, or (NULL) in none. 0 where it marches them: one level set
+ * alone, which keeps its voxels so, and masks and texts alone. Spheres in closed form and heightfields
+ * that are marched do not count. Also 1 if there are no other casters. */
+int32_t vshi_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer);
+
+/* 1 where shadows of the casters in `layer`, or (NULL) in none, or AO are baked by a method that knows them
+ * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
+int32_t vshi_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
+
+/* What vshi_scene_resolution() gives where it is named. */
+enum { VSHI_RESOLUTION_NAMED = -1 };
+
+/* Voxels along the longest side of the casters in `layer`, or (NULL) in none, where `points` of receivers are
+ * to be shaded by the scene's methods (docs/accuracy.md: how they are chosen). VSHI_RESOLUTION_NAMED: those
+ * that the scene or the layer names; 0: none, rays against triangles are faster alone. It depends on what
+ * the scene holds, and on nothing else. `assets` are those loaded for this scene. Cannot fail. */
+int32_t vshi_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
+                              double points);
+
+/* A scene's casters as rays meet them, whatever their layers: the triangles of meshes and heightfields, and
+ * procedural ones as they are, for vshi_trace_shadow() and vshi_trace_ao(). Each is NULL where there are
+ * none. Free them with vshi_triangles_free() and vshi_solids_free(). Errors: VSH_ERROR_ARGUMENT (a pointer
+ * NULL, run); as vshi_triangles_create() and vshi_solids_create(). */
+vsh_result vshi_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
+                            vshi_triangles **triangles, vshi_solids **solids, vsh_error *error);
+
+/* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
+ * world box: see vshi_field_options. Directional lights count up to a half angle of 60°. */
+double vshi_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
+                        const double receivers_max[3]);
+
+/* The pages of a receiver: one, one for each object, or those of an atlas. Meshes are sorted by pages. An
+ * atlas cuts them along their charts; a mesh on several pages has a part on each, all of one object. */
+typedef struct vshi_receiver_pages {
+    size_t count;
+    vshi_receiver_page *list; /* [count] */
+    size_t *begins;           /* [count + 1]: first mesh of each page */
+    vsh_atlas *atlas;         /* NULL: the meshes are the file's */
+    size_t *atlas_numbers;    /* [meshes]: of each in the atlas */
+    uint32_t *memory;         /* positions, normals and indices of the parts */
+} vshi_receiver_pages;
 
 /* One caster or receiver. Its transform is in front of its meshes' own. */
 typedef struct vshi_asset_place {
     vsh_mesh *meshes;
-    double *transforms; /* [count][12] */
-    size_t *numbers;    /* [count]: of each in its model */
+    double *transforms;      /* [count][12] */
+    const double *transform; /* these two in front of the meshes' own; they do not outlive the scene */
+    double scale;
+    size_t *numbers; /* [count]: of each in its model */
     size_t count;
     struct vshi_asset_file *file; /* of mesh casters and receivers; belongs to the assets, as the next two */
     const vsh_model *model;       /* that of the file */
     const vsh_grid *grid;         /* vdb casters */
     vsh_outline *outline;         /* mask and text casters */
     vsh_model *made;              /* of heightfields; its meshes are this place's */
-    vsh_heights *heights;         /* of direct heightfields, beside `made` */
-    vsh_spheres *spheres;         /* voxelised or not */
+    vshi_heights *heights;        /* of direct heightfields, beside `made` */
+    vshi_spheres *spheres;        /* voxelised or not */
     bool direct;
     vshi_mesh_set set; /* these two of a receiver */
-    vshi_unwrapped unwrapped;
+    vshi_receiver_pages pages;
 } vshi_asset_place;
 
 /* A caster; all zero beyond the last. */
@@ -57,11 +147,11 @@ size_t vshi_assets_mesh_count(const vsh_assets *assets);
 /* Whether its meshes are unwrapped: VSH_RECEIVER_UNWRAP_NEVER, …_AUTO or …_ALWAYS. */
 int32_t vshi_receiver_unwrap(const vsh_receiver *receiver);
 
-/* Lists a receiver's pages: one, or one for each object. Unwraps its meshes where it has to, and puts the
- * parts in their place. Errors: as vsh_unwrap(); VSH_ERROR_ARGUMENT (max_size without texels_per_unit). */
+/* Lists a receiver's pages. Unwraps its meshes if it has to, and puts the parts in their place. Errors: as
+ * vsh_unwrap(); VSH_ERROR_ARGUMENT (max_size without texels_per_unit). */
 vsh_result vshi_place_pages(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                             vsh_error *error);
-void vshi_unwrapped_free(vshi_unwrapped *unwrapped);
+void vshi_receiver_pages_free(vshi_receiver_pages *pages);
 
 /* --- which of a file's meshes a caster or receiver takes */
 
@@ -70,19 +160,11 @@ void vshi_unwrapped_free(vshi_unwrapped *unwrapped);
 vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
                             size_t count, unsigned char **chosen, vsh_error *error);
 
-/* The name of a mesh's object; "" where it has none. */
+/* The name of a mesh's object, or "". */
 static inline const char *vshi_object_name(const vsh_mesh *mesh) {
     const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
     return name != NULL ? name : "";
 }
-
-/* Whether a pattern means a mesh by its object's name, as vsh_mesh_matches() does, or by its `material`'s:
- * that is asked where it means no mesh by the other. */
-bool vshi_mesh_is_meant(const vsh_mesh *mesh, const char *pattern, bool material);
-
-/* VSH_ERROR_INPUT, saying what a pattern may have meant that matches none of a model's meshes. */
-vsh_result vshi_fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
-                               vsh_error *error);
 
 /* --- the alpha of textures and vertices, by which a model's meshes cast */
 
@@ -115,50 +197,30 @@ typedef enum vshi_blend {
     VSHI_BLEND_GLASS,
     VSHI_BLEND_CUT_OUT, /* as masked ones are: nearly all of its texture is clear or opaque, and there is some
                            of both. So exporters make hashed leaves */
-    VSHI_BLEND_NOTHING  /* opaque: vsh_model_material.by_texture, and nothing of it is left out */
+    VSHI_BLEND_NOTHING  /* as opaque ones: vshi_material.by_texture, without holes */
 } vshi_blend;
 
 /* Warnings and errors: as above. */
 vsh_result vshi_masks_blend(vshi_masks *masks, size_t mesh, const vsh_run *run, vshi_blend *blend,
                             vsh_error *error);
 
-/* --- how casters are shaded */
-
-/* Whether a caster is in a layer, or (NULL) in none. */
-static inline bool vshi_caster_in_layer(const vsh_caster *caster, const vsh_scene_layer *layer) {
-    return caster->layer == NULL ? layer == NULL : layer != NULL && strcmp(caster->layer, layer->name) == 0;
-}
+/* --- how casters are shaded. A layer of NULL stands for the casters that are in no layer */
 
 /* Whether a caster stays out of level sets: spheres and direct heightfields, if shadows are `hard` or
  * `classic` and AO, if there is any, is traced. */
 bool vshi_caster_is_direct(const vsh_scene *scene, const vsh_caster *caster);
 
-/* vsh_scene_triangles() of one caster alone, for the AO of casters that are shaded without voxels. */
-vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
-                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error);
+/* Whether a caster is in the layer, and in its level set. */
+bool vshi_caster_has_voxels(const vsh_scene *scene, const vsh_caster *caster, const vsh_scene_layer *layer);
 
-/* Whether a bake compares its values with rays against the casters themselves. It does not if no method keeps
- * an error, if layers cast, or if rays cannot meet all casters. */
-bool vshi_scene_wants_truth(const vsh_scene *scene);
+/* Whether the scene or the layer sets its voxels. */
+bool vshi_scene_sets_voxels(const vsh_scene *scene, const vsh_scene_layer *layer);
 
-/* Whether the scene or the layer names its voxels. */
-bool vshi_scene_voxels_named(const vsh_scene *scene, const vsh_scene_layer *layer);
-
-/* Whether a layer's only caster, or (NULL) that in none, is a level set; and whether it keeps its voxels, as
- * nobody named others. */
-bool vshi_scene_is_level_set(const vsh_scene *scene, const vsh_scene_layer *layer);
+/* Whether the layer's only caster is a level set that keeps its voxels. */
 bool vshi_scene_keeps_voxels(const vsh_scene *scene, const vsh_scene_layer *layer);
 
-/* Whether a method that a layer's casters, or (NULL) those in none, are shaded with has all of `traits`,
- * VSH_METHOD_…, or (`has` false) lacks one: of shadows where there are lights, of AO where it is baked. */
-bool vshi_scene_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has);
-
-/* About how many rays adaptive casts on the field of a layer's casters, or (NULL) of those in none, from each
- * point that is shaded. */
-double vshi_scene_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer);
-
-/* Whether a caster has triangles, or is made of voxels among a layer's, or (NULL) those in none. */
-bool vshi_caster_has_triangles(const vsh_caster *caster);
-bool vshi_caster_has_voxels(const vsh_scene *scene, const vsh_caster *caster, const vsh_scene_layer *layer);
+/* vshi_scene_triangles() of one caster alone, for the AO of casters that are shaded without voxels. */
+vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
+                                       const vsh_run *run, vshi_triangles **triangles, vsh_error *error);
 
 #endif

@@ -1,6 +1,6 @@
-/* Reads casters from scene files: transforms, procedural shapes, and one table of keys for all types. */
+/* Reads casters from scene files and flat ones: transforms, procedural shapes, and tables of keys. */
 #include "base/elementary.h"
-#include "base/similarity.h"
+#include "base/memory.h"
 #include "base/vec.h"
 #include "scene/scene.h"
 
@@ -11,9 +11,6 @@
 #include <unistd.h>
 
 /* --- transforms */
-
-/* Shear that numbers written with seven digits leave in a rotation. */
-static const double SIMILARITY_TOLERANCE = 1e-5;
 
 /* [x, y, z] degrees into double[4], the quaternion x, y, z, w: about x first, then y, then z, each about the
  * fixed axes (Blender's "XYZ Euler"). */
@@ -114,20 +111,6 @@ vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void 
     return VSH_OK;
 }
 
-/* Whether lengths all change by the same factor: rotation, translation, mirroring, uniform scale. */
-static bool is_similarity(const double m[12]) {
-    const vshi_vec a[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}}; /* of the axes */
-    const double length2 = vshi_dot(a[0], a[0]);
-    for (int i = 0; i < 3; ++i) {
-        const int j = (i + 1) % 3;
-        if (fabs(vshi_dot(a[i], a[i]) - length2) > SIMILARITY_TOLERANCE * length2 ||
-            fabs(vshi_dot(a[i], a[j])) > SIMILARITY_TOLERANCE * length2) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /* --- procedural shapes */
 
 enum { MAX_NODES = 65536, MAX_LEVELS = 64 };
@@ -198,27 +181,19 @@ static const vshi_key node_keys[] = {
 static const vshi_table node_table = VSHI_TABLE(node_keys);
 #undef AT
 
-/* Nodes so far; grown by doubling, since their number is known only at the end. */
 typedef struct tree {
-    vsh_sdf_node *nodes;
-    size_t count;
-    size_t capacity;
+    vsh_sdf_node *nodes; /* [count] */
+    size_t count, capacity;
 } tree;
 
-static vsh_result push(vshi_json *reader, const vshi_value *value, tree *t, const vsh_sdf_node *node,
-                       int32_t *index) {
+static vsh_result add_node(vshi_json *reader, const vshi_value *value, tree *t, const vsh_sdf_node *node,
+                           int32_t *index) {
     if (t->count == MAX_NODES) {
         return vshi_json_fail(reader, value, "is node %zu of its tree, out of range 1 … %d", t->count + 1,
                               MAX_NODES);
     }
-    if (t->count == t->capacity) {
-        t->capacity = t->capacity == 0 ? 16 : 2 * t->capacity;
-        vsh_sdf_node *nodes = realloc(t->nodes, t->capacity * sizeof *nodes);
-        if (nodes == NULL) {
-            return vshi_fail(reader->error, VSH_ERROR_MEMORY, "sdf nodes: the system refused memory");
-        }
-        t->nodes = nodes;
-    }
+    VSHI_TRY(vshi_make_room((void **)&t->nodes, t->count, &t->capacity, sizeof *t->nodes, "sdf nodes",
+                            reader->error));
     *index = (int32_t)t->count;
     t->nodes[t->count++] = *node;
     return VSH_OK;
@@ -261,7 +236,7 @@ static vsh_result read_node(vshi_json *reader, const vshi_value *value, tree *t,
     }
     vshi_value of;
     if (!vshi_member(value, "of", &of)) {
-        return push(reader, value, t, &node, index);
+        return add_node(reader, value, t, &node, index);
     }
     VSHI_TRY(vshi_expect(reader, &of, JSON_ARRAY));
     const size_t size = json_array_size(of.json);
@@ -284,13 +259,13 @@ static vsh_result read_node(vshi_json *reader, const vshi_value *value, tree *t,
         vsh_sdf_node *next = i + 1 < size ? &pair : &node;
         next->left = left;
         next->right = right;
-        VSHI_TRY(push(reader, &item, t, next, &left));
+        VSHI_TRY(add_node(reader, &item, t, next, &left));
     }
     *index = left;
     return VSH_OK;
 }
 
-/* Nested objects, as the plain array of nodes that a vsh_sdf is. */
+/* Reads nested objects into the plain array of nodes of a vsh_sdf. */
 static vsh_result read_sdf(vshi_json *reader, const vshi_value *value, void *member) {
     tree t = {NULL, 0, 0};
     int32_t root;
@@ -328,7 +303,7 @@ _Static_assert(PAIR(vsh_selection, only, only_count) && PAIR(vsh_selection, exce
                    PAIR(vsh_caster, one_sided, one_sided_count),
                "patterns are as vshi_list");
 
-/* Adds patterns to a caster's rules of solidity: the key names what the meshes are. */
+/* Adds patterns to a caster's rules of solidity. The key is the solidity of their meshes. */
 static vsh_result read_rules(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_caster *caster = member;
     const int32_t solidity = strcmp(value->key, "solid") == 0   ? VSH_SOLIDITY_SOLID
@@ -349,21 +324,42 @@ static vsh_result read_rules(vshi_json *reader, const vshi_value *value, void *m
     return VSH_OK;
 }
 
-/* --- casters */
+/* --- masks and texts, as solids and in a plane */
 
-vsh_result vshi_read_rows(vshi_json *reader, const vshi_value *array, int32_t columns, const char *what,
-                          const double **rows) {
-    const vshi_key key = {.kind = VSHI_VECTOR, .count = columns, VSHI_ANY};
-    const size_t count = json_array_size(array->json), width = (size_t)columns;
-    double *read;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&read, count, width * sizeof *read, what));
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_value item = vshi_item(array, i);
-        VSHI_TRY(vshi_read_value(reader, &item, &key, read + width * i));
-    }
-    *rows = read;
-    return VSH_OK;
+/* `size` of a mask, one number or two. */
+static vsh_result read_mask_size(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_mask_options *mask = member;
+    const vshi_key key = {.kind = json_is_array(value->json) ? VSHI_VECTOR : VSHI_NUMBER,
+                          .count = 2,
+                          .highest = VSHI_LARGEST,
+                          .flags = VSHI_ABOVE};
+    double size[2] = {0.0, 0.0}; /* a height of 0: by the image's proportions */
+    const vsh_result result = vshi_read_value(reader, value, &key, size);
+    mask->width = size[0];
+    mask->height = size[1];
+    return result;
 }
+
+/* Rows for a struct with path, text, mask and letters, which hold the options' defaults. `of_mask` and
+ * `of_text` are the bits of the two variants. */
+#define VSHI_OUTLINE_KEYS(target, of_mask, of_text)                                                          \
+    VSHI_KEY("mask", PATH, .variants = of_mask, .offset = offsetof(target, path)),                           \
+        VSHI_KEY("size", CUSTOM, VSHI_NEEDED_BY(of_mask), .offset = offsetof(target, mask),                  \
+                 .read = read_mask_size),                                                                    \
+        VSHI_KEY("channel", STRING, .variants = of_mask, .offset = offsetof(target, mask.channel)),          \
+        VSHI_KEY("threshold", NUMBER, .variants = of_mask, .offset = offsetof(target, mask.threshold),       \
+                 VSHI_ANY),                                                                                  \
+        VSHI_KEY("invert", BOOL, .variants = of_mask, .offset = offsetof(target, mask.invert)),              \
+        VSHI_KEY("text", STRING, .variants = of_text, .offset = offsetof(target, text)),                     \
+        VSHI_KEY("font", PATH, VSHI_NEEDED_BY(of_text), .offset = offsetof(target, path)),                   \
+        VSHI_KEY("height", NUMBER, VSHI_NEEDED_BY(of_text), .offset = offsetof(target, letters.height),      \
+                 VSHI_POSITIVE),                                                                             \
+        VSHI_KEY("line_spacing", NUMBER, .variants = of_text,                                                \
+                 .offset = offsetof(target, letters.line_spacing), .highest = 1e3, .flags = VSHI_ABOVE),     \
+        VSHI_KEY("align", NAME, .variants = of_text, .offset = offsetof(target, letters.align),              \
+                 .names = VSH_NAMES_ALIGN)
+
+/* --- casters */
 
 enum {
     MESH = 1 << VSH_CASTER_MESH,
@@ -404,6 +400,21 @@ vsh_result vshi_read_type(vshi_json *reader, const vshi_value *object, const cha
     return VSH_OK;
 }
 
+/* The arrays of numbers in an array, each of so many. */
+static vsh_result read_rows(vshi_json *reader, const vshi_value *array, int32_t columns, const char *what,
+                            const double **rows) {
+    const vshi_key key = {.kind = VSHI_VECTOR, .count = columns, VSHI_ANY};
+    const size_t count = json_array_size(array->json), width = (size_t)columns;
+    double *read;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&read, count, width * sizeof *read, what));
+    for (size_t i = 0; i < count; ++i) {
+        const vshi_value item = vshi_item(array, i);
+        VSHI_TRY(vshi_read_value(reader, &item, &key, read + width * i));
+    }
+    *rows = read;
+    return VSH_OK;
+}
+
 /* A file's name, or [[x, y, z, radius], …]. */
 static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key path = {.kind = VSHI_PATH};
@@ -418,7 +429,7 @@ static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void 
     if (caster->sphere_count == 0) {
         return vshi_json_fail(reader, value, "is empty");
     }
-    VSHI_TRY(vshi_read_rows(reader, value, 4, "spheres", &caster->spheres));
+    VSHI_TRY(read_rows(reader, value, 4, "spheres", &caster->spheres));
     for (size_t i = 0; i < caster->sphere_count; ++i) {
         if (!(caster->spheres[4 * i + 3] > 0.0)) {
             const vshi_value item = vshi_item(value, i), radius = vshi_item(&item, 3);
@@ -479,6 +490,7 @@ static const vshi_key caster_keys[] = {
     VSHI_KEY("thickness", NUMBER, AT(thickness), VSHI_NEEDED_BY(MASK | TEXT), VSHI_POSITIVE),
 };
 static const vshi_table caster_table = VSHI_TABLE(caster_keys);
+#undef AT
 
 vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_caster *caster = member;
@@ -486,7 +498,7 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     vshi_value transform;
     VSHI_TRY(vshi_read_type(reader, value, keys, sizeof keys / sizeof keys[0], &caster->type));
-    /* A caster of no type still has its keys looked over: the type's name may be what is misspelt. */
+    /* keys are checked even without a type, whose name may be misspelt */
     const uint32_t variant = caster->type < 0 ? VSHI_ALL : 1U << caster->type;
     VSHI_TRY(vshi_read_object(reader, value, &caster_table, variant,
                               caster->type < 0 ? "a caster" : whats[caster->type], caster));
@@ -502,10 +514,97 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
                                   whats[caster->type]);
         }
     }
-    if (caster->type != VSH_CASTER_MESH && !is_similarity(caster->transform) &&
+    if (caster->type != VSH_CASTER_MESH && vshi_similarity_scale(caster->transform) <= 0.0 &&
         vshi_member(value, "transform", &transform)) {
         return vshi_json_fail(reader, &transform, "shears or scales unevenly, which %s cannot",
                               whats[caster->type]);
     }
+    return VSH_OK;
+}
+
+/* --- flat casters */
+
+enum {
+    FLAT_MASK = 1 << VSH_FLAT_MASK,
+    FLAT_TEXT = 1 << VSH_FLAT_TEXT,
+    CIRCLE = 1 << VSH_FLAT_CIRCLE,
+    BOX = 1 << VSH_FLAT_BOX,
+    POLYGON = 1 << VSH_FLAT_POLYGON
+};
+
+static const size_t MAX_POINTS = (size_t)1 << 20;
+
+/* Names of the shapes, from VSH_FLAT_CIRCLE on. */
+static const char *flat_shape_name(int32_t i) {
+    static const char *const names[] = {"circle", "box", "polygon", NULL};
+    return names[i];
+}
+
+static vsh_result read_points(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_flat_caster *caster = member;
+    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
+    const size_t count = json_array_size(value->json);
+    if (count < 3 || count > MAX_POINTS) {
+        return vshi_json_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
+    }
+    VSHI_TRY(read_rows(reader, value, 2, "points", &caster->points));
+    caster->point_count = count;
+    return VSH_OK;
+}
+
+/* A caster, and the numbers that make its transform. */
+typedef struct placed {
+    vsh_flat_caster caster; /* first: its keys' offsets are those of the whole */
+    double translate[2];
+    double rotate;
+    double scale;
+} placed;
+
+#define AT(member) .offset = offsetof(placed, member)
+static const vshi_key flat_keys[] = {
+    VSHI_OUTLINE_KEYS(vsh_flat_caster, FLAT_MASK, FLAT_TEXT),
+    VSHI_KEY("shape", LATER, .variants = CIRCLE | BOX | POLYGON),
+    VSHI_KEY("radius", NUMBER, AT(caster.radius), VSHI_NEEDED_BY(CIRCLE), VSHI_POSITIVE),
+    VSHI_KEY("half_size", VECTOR, AT(caster.half_size), VSHI_NEEDED_BY(BOX), .count = 2, VSHI_POSITIVE),
+    VSHI_KEY("points", CUSTOM, VSHI_NEEDED_BY(POLYGON), .read = read_points),
+    VSHI_KEY("translate", VECTOR, AT(translate), .count = 2, VSHI_ANY),
+    VSHI_KEY("rotate_deg", NUMBER, AT(rotate), .lowest = -1e6, .highest = 1e6),
+    VSHI_KEY("scale", NUMBER, AT(scale), .lowest = 1e-6, .highest = 1e6),
+};
+static const vshi_table flat_table = VSHI_TABLE(flat_keys);
+#undef AT
+
+static void compose_flat(const placed *p, double m[6]) {
+    const double angle = remainder(p->rotate, 360.0) / 180.0 * VSHI_PI;
+    const double c = p->scale * vshi_cos(angle), s = p->scale * vshi_sin(angle);
+    const double transform[6] = {c, -s, p->translate[0], s, c, p->translate[1]};
+    memcpy(m, transform, sizeof transform);
+}
+
+vsh_result vshi_read_flat_caster(vshi_json *reader, const vshi_value *value, void *member) {
+    vsh_flat_caster *caster = member;
+    placed p = {.scale = 1.0};
+    p.caster.mask = vsh_mask_options_default();
+    p.caster.letters = vsh_text_options_default();
+    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
+    static const char *const kinds[] = {"mask", "text", "shape"};
+    static const char *const flat_whats[] = {"a mask", "a text", "a circle", "a box", "a polygon"};
+    int32_t type;
+    VSHI_TRY(vshi_read_type(reader, value, kinds, 3, &type));
+    if (type == 2) {
+        int32_t shape = 0;
+        VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = flat_shape_name},
+                                  &shape));
+        type = VSH_FLAT_CIRCLE + shape;
+    }
+    /* keys are checked even without a type, whose name may be misspelt */
+    p.caster.type = type;
+    VSHI_TRY(vshi_read_object(reader, value, &flat_table, type < 0 ? VSHI_ALL : 1U << type,
+                              type < 0 ? "a caster" : flat_whats[type], &p));
+    if (type < 0) {
+        return vshi_json_fail(reader, value, "key \"mask\", \"text\" or \"shape\" is missing");
+    }
+    compose_flat(&p, p.caster.transform);
+    *caster = p.caster;
     return VSH_OK;
 }

@@ -1,7 +1,8 @@
-/* Lights: those that a scene file lists, in space or in a plane, and those of models and their files. */
+/* Lights of scene files, in space or in a plane, and of models and their files. */
 #include "base/memory.h"
 #include "light/light.h"
-#include "light/types.h"
+#include "model/model.h"
+#include "scene/assets.h"
 #include "scene/scene.h"
 
 #include <math.h>
@@ -12,7 +13,7 @@
 
 /* --- one light */
 
-/* Behind those of lights what stands in their place: a file of some (read_item()). */
+/* Names the types of lights, then a file of lights (read_item()). */
 static const char *type_name(int32_t i) {
     const vshi_light_type *type = vshi_light_type_of(i);
     const bool behind = type == NULL && i > 0 && vshi_light_type_of(i - 1) != NULL;
@@ -32,8 +33,9 @@ static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *me
     VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
     const char *name = json_string_value(value->json);
     if (!vshi_light_name_valid(name)) {
-        return vshi_json_fail(reader, value,
-                              "\"%.64s\" is no light's name: 1 … 63 of A … Z, a … z, 0 … 9, _ and -", name);
+        return vshi_json_fail(
+            reader, value, "\"%.64s\" cannot name a light: expected 1 … 63 of A … Z, a … z, 0 … 9, _ and -",
+            name);
     }
     memcpy(member, name, strlen(name) + 1);
     return VSH_OK;
@@ -41,26 +43,26 @@ static vsh_result read_name(vshi_json *reader, const vshi_value *value, void *me
 
 enum { MOST_KEYS = 24 };
 
-/* A bound in files, whose numbers are no larger than VSHI_LARGEST and whose angles are degrees. */
-static double bound_of(const vshi_light_member *m, double bound) {
+/* Converts a bound for files: numbers are at most VSHI_LARGEST, and angles are degrees. */
+static double convert_bound(const vshi_light_member *m, double bound) {
     const double number = m->kind == VSHI_LIGHT_ANGLE ? bound / VSHI_PI * 180.0 : bound;
     return fmin(fmax(number, -VSHI_LARGEST), VSHI_LARGEST);
 }
 
-static vshi_key key_of(const vshi_light_member *m, int32_t dimensions) {
+static vshi_key make_key(const vshi_light_member *m, int32_t dimensions) {
     static const vshi_key_kind kinds[] = {[VSHI_LIGHT_NUMBER] = VSHI_NUMBER,
                                           [VSHI_LIGHT_ANGLE] = VSHI_DEGREES,
                                           [VSHI_LIGHT_VECTOR] = VSHI_VECTOR,
                                           [VSHI_LIGHT_SWITCH] = VSHI_BOOL};
-    /* what is excluded at infinity is not at the largest number */
+    /* bounds at infinity are excluded, but the largest number is not */
     const bool above = m->above && isfinite(m->lowest), below = m->below && isfinite(m->highest);
     return (vshi_key){.name = m->key,
                       .kind = kinds[m->kind],
                       .variants = m->types,
                       .required = m->required,
                       .offset = m->offset,
-                      .lowest = bound_of(m, m->lowest),
-                      .highest = bound_of(m, m->highest),
+                      .lowest = convert_bound(m, m->lowest),
+                      .highest = convert_bound(m, m->highest),
                       .flags = (above ? VSHI_ABOVE : 0) | (below ? VSHI_BELOW : 0) |
                                (m->nonzero ? VSHI_NONZERO : 0),
                       .count = dimensions};
@@ -82,7 +84,7 @@ static size_t list_keys(bool flat, vshi_key keys[MOST_KEYS]) {
     memcpy(keys, common, count * sizeof *keys);
     for (size_t i = 0; i < vshi_light_member_count && count < MOST_KEYS; ++i) {
         if ((vshi_light_members[i].types & types) != 0) {
-            keys[count++] = key_of(&vshi_light_members[i], flat ? 2 : 3);
+            keys[count++] = make_key(&vshi_light_members[i], flat ? 2 : 3);
         }
     }
     return count;
@@ -94,7 +96,7 @@ static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool fla
     int32_t type = -1;
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     VSHI_TRY(vshi_read_choice(reader, value, &key, &type));
-    /* A light without a type still has its keys looked over: "type" may be what is misspelt. */
+    /* keys are checked even without a type, which may be misspelt */
     char what[32] = "a light";
     if (type >= 0) {
         snprintf(what, sizeof what, "a %s light", vshi_key_name(&key, type));
@@ -104,8 +106,8 @@ static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool fla
     return vshi_read_object(reader, value, &table, type < 0 ? VSHI_ALL : 1U << type, what, light);
 }
 
-/* What no key alone can tell. */
-static vsh_result check(vshi_json *reader, const vshi_value *value, const vsh_light *light) {
+/* Checks keys together. */
+static vsh_result check_light(vshi_json *reader, const vshi_value *value, const vsh_light *light) {
     vshi_value inner, outer;
     if (light->inner_angle > light->outer_angle && light->type == VSH_LIGHT_SPOT &&
         vshi_member(value, "inner_deg", &inner) && vshi_member(value, "outer_deg", &outer)) {
@@ -113,10 +115,8 @@ static vsh_result check(vshi_json *reader, const vshi_value *value, const vsh_li
                               json_number_value(outer.json));
     }
     vsh_error error;
-    if (vsh_light_check(light, &error) != VSH_OK) { /* a limit that the tables above do not know of */
-        return vshi_json_fail(reader, value, "%.400s", error.message);
-    }
-    return VSH_OK;
+    return vsh_light_check(light, &error) == VSH_OK ? VSH_OK
+                                                    : vshi_json_fail(reader, value, "%.400s", error.message);
 }
 
 static vsh_result read_light(vshi_json *reader, const vshi_value *value, void *member) {
@@ -129,24 +129,24 @@ static vsh_result read_light(vshi_json *reader, const vshi_value *value, void *m
         return vshi_json_fail(reader, value, "key \"reach\" is missing: falloff \"quadratic\" needs it");
     }
     if (light->falloff != VSH_FALLOFF_QUADRATIC && has_reach) {
-        return vshi_json_fail_key(reader, &reach, "is of no use without falloff \"quadratic\"");
+        return vshi_json_fail_key(reader, &reach, "needs falloff \"quadratic\"");
     }
-    return check(reader, value, light);
+    return check_light(reader, value, light);
 }
 
 vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
-    light->direction[1] = light->axis[1] = 0.0; /* so that what is read is all there is */
+    light->direction[1] = light->axis[1] = 0.0; /* only the file's numbers count */
     VSHI_TRY(read_keys(reader, value, true, light));
     vshi_value reach;
     if (vshi_member(value, "reach", &reach)) {
         light->falloff = VSH_FALLOFF_QUADRATIC;
     }
-    return check(reader, value, light);
+    return check_light(reader, value, light);
 }
 
-/* --- lists of lights and of files that have some */
+/* --- lists of lights and of files with lights */
 
 enum { MAX_LIGHTS = VSH_MAX_CHANNELS - 5 /* ao, A and three of irradiance must fit into the image too */ };
 
@@ -177,8 +177,8 @@ static vsh_result read_item(vshi_json *reader, const vshi_value *value, void *me
     return vshi_read_object(reader, value, &file_table, VSHI_ALL, "a file of lights", &one->file);
 }
 
-/* Which item of the list a light is of. */
-static size_t item_of(const vsh_scene *scene, size_t light) {
+/* Finds the list's item of a light: a file's item has several lights, or none. */
+static size_t find_item(const vsh_scene *scene, size_t light) {
     size_t place = light;
     for (size_t i = 0; i < scene->light_file_count && light >= scene->light_files[i].first; ++i) {
         const vsh_light_file *file = &scene->light_files[i];
@@ -191,7 +191,7 @@ static size_t item_of(const vsh_scene *scene, size_t light) {
 }
 
 vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_t light) {
-    return vshi_item(list, item_of(scene, light));
+    return vshi_item(list, find_item(scene, light));
 }
 
 vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene) {
@@ -204,9 +204,9 @@ vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, con
             vshi_value name;
             return scene->light_file_count == 0 && vshi_member(&of, "name", &name)
                        ? vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
-                                        scene->lights[i].name, item_of(scene, k))
+                                        scene->lights[i].name, find_item(scene, k))
                        : vshi_json_fail(reader, &of, "has a light \"%s\", as lights[%zu] has",
-                                        scene->lights[i].name, item_of(scene, k));
+                                        scene->lights[i].name, find_item(scene, k));
         }
     }
     return VSH_OK;
@@ -230,8 +230,9 @@ static vsh_result add_item(vshi_json *reader, const vshi_value *value, const ite
         }
     }
     if (count > MAX_LIGHTS - scene->light_count) {
-        result = vshi_json_fail(reader, value, "are %zu lights, which with those before are over %d", count,
-                                MAX_LIGHTS);
+        result =
+            vshi_json_fail(reader, value, "has %zu lights, which with the lights before are more than %d",
+                           count, MAX_LIGHTS);
         goto done;
     }
     if (file) {
@@ -277,8 +278,8 @@ static bool is_taken(const vsh_light *lights, size_t count, const char *name) {
     return false;
 }
 
-/* One that a channel can have, and that none of the lights before it has: "Key light" becomes "Key_light",
- * and the next of them "Key_light_2". */
+/* Makes a name for channels that no light before has: "Key light" becomes "Key_light", the next one
+ * "Key_light_2". */
 static void make_name(const char *given, const vsh_light *before, size_t count, char name[64]) {
     enum { ROOM = 10 /* for the number of a second light of one name */ };
     snprintf(name, 64 - ROOM, "%s", given != NULL && given[0] != '\0' ? given : "light");
@@ -292,23 +293,23 @@ static void make_name(const char *given, const vsh_light *before, size_t count, 
     }
 }
 
-static vsh_light light_of(const vsh_model_light *given, double angle, double radius, double scale) {
-    static const int32_t types[] = {[VSH_MODEL_LIGHT_DIRECTIONAL] = VSH_LIGHT_DIRECTIONAL,
-                                    [VSH_MODEL_LIGHT_POINT] = VSH_LIGHT_SPHERE,
-                                    [VSH_MODEL_LIGHT_SPOT] = VSH_LIGHT_SPOT};
+static vsh_light make_light(const vshi_model_light *given, double angle, double radius, double scale) {
+    static const int32_t types[] = {[VSHI_MODEL_LIGHT_DIRECTIONAL] = VSH_LIGHT_DIRECTIONAL,
+                                    [VSHI_MODEL_LIGHT_POINT] = VSH_LIGHT_SPHERE,
+                                    [VSHI_MODEL_LIGHT_SPOT] = VSH_LIGHT_SPOT};
     vsh_light light = vsh_light_default();
     light.type = types[given->type];
     light.falloff =
-        given->type == VSH_MODEL_LIGHT_DIRECTIONAL ? VSH_FALLOFF_NONE : VSH_FALLOFF_INVERSE_SQUARE;
+        given->type == VSHI_MODEL_LIGHT_DIRECTIONAL ? VSH_FALLOFF_NONE : VSH_FALLOFF_INVERSE_SQUARE;
     light.angle = angle;
     light.radius = radius;
-    if (given->type == VSH_MODEL_LIGHT_SPOT) {
+    if (given->type == VSHI_MODEL_LIGHT_SPOT) {
         light.inner_angle = given->inner_angle;
         light.outer_angle = given->outer_angle;
         memcpy(light.axis, given->direction, sizeof light.axis); /* away from the spot */
     }
     for (int i = 0; i < 3; ++i) {
-        if (given->type == VSH_MODEL_LIGHT_DIRECTIONAL) {
+        if (given->type == VSHI_MODEL_LIGHT_DIRECTIONAL) {
             light.direction[i] = 0.0 - given->direction[i]; /* towards the sun */
         }
         light.position[i] = scale * given->position[i];
@@ -317,24 +318,24 @@ static vsh_light light_of(const vsh_model_light *given, double angle, double rad
     return light;
 }
 
-vsh_result vsh_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
-                                 vsh_light **lights, size_t *count, vsh_error *error) {
+vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
+                                  vsh_light **lights, size_t *count, vsh_error *error) {
     VSHI_NEEDS(lights);
     *lights = NULL;
     VSHI_NEEDS(count);
     *count = 0;
     VSHI_NEEDS(model);
     if (!(unit >= 0.0 && isfinite(unit))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lights_from_model: unit is %g, expected at least 0",
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_lights_from_model: unit is %g, expected at least 0",
                          unit);
     }
-    const size_t all = vsh_model_light_count(model);
+    const size_t all = vshi_model_light_count(model);
     const double own = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
     vsh_light *made = NULL;
     VSHI_TRY(vshi_allocate((void **)&made, all, sizeof *made, "lights", error));
     for (size_t i = 0; i < all; ++i) {
-        const vsh_model_light given = vsh_model_get_light(model, i);
-        made[i] = light_of(&given, angle, radius, unit > 0.0 ? unit / own : 1.0);
+        const vshi_model_light given = vshi_model_get_light(model, i);
+        made[i] = make_light(&given, angle, radius, unit > 0.0 ? unit / own : 1.0);
         make_name(given.name, made, i, made[i].name);
         const vsh_result result = vsh_light_check(&made[i], error);
         if (result != VSH_OK) {
@@ -355,7 +356,7 @@ vsh_result vsh_lights_read(const char *path, double angle, double radius, double
     *count = 0;
     vsh_model *model = NULL;
     VSHI_TRY(vsh_model_read(path, run, &model, error));
-    const vsh_result result = vsh_lights_from_model(model, angle, radius, unit, lights, count, error);
+    const vsh_result result = vshi_lights_from_model(model, angle, radius, unit, lights, count, error);
     vsh_model_free(model);
     return result;
 }

@@ -1,22 +1,24 @@
 /* What an output was made of, as lines of text: settings as they are in force, and hashes of all inputs. */
-#include "base/attributes.h"
 #include "base/decimal.h"
-#include "base/digest.h"
+#include "base/file.h"
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/text.h"
+#include "method/method.h"
 #include "model/model.h"
+#include "scene/scene.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
-#include <vdbshade/provenance.h>
+#include <vdbshade/scene.h>
 
 enum { NAME_SIZE = 96, LINE_SIZE = 512 };
 enum { HASH_UNITS = 1 << 30 }; /* of the job, for all inputs */
-enum { RAYS = 64 };            /* of methods that keep no error, where none are given */
+enum { RAYS = 64 };            /* default of methods that keep no error */
 
 static vsh_result out_of_memory(const char *what, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
@@ -29,26 +31,23 @@ typedef struct file_list {
     size_t count, capacity;
 } file_list;
 
-/* Takes `path` over, which is NULL where memory was short. */
-static vsh_result add_path(file_list *inputs, char *path, vsh_error *error) {
+/* Adds a path once and owns it; NULL: memory was short. */
+static vsh_result add_path(void *user, char *path, vsh_error *error) {
+    file_list *inputs = user;
+    bool known = false;
     if (path == NULL) {
         return out_of_memory("inputs", error);
     }
-    for (size_t i = 0; i < inputs->count; ++i) {
-        if (strcmp(inputs->paths[i], path) == 0) {
-            free(path);
-            return VSH_OK;
-        }
+    for (size_t i = 0; i < inputs->count && !known; ++i) {
+        known = strcmp(inputs->paths[i], path) == 0;
     }
-    if (inputs->count == inputs->capacity) {
-        const size_t capacity = 2 * inputs->capacity + 16;
-        char **paths = realloc(inputs->paths, capacity * sizeof *paths);
-        if (paths == NULL) {
-            free(path);
-            return out_of_memory("inputs", error);
-        }
-        inputs->paths = paths;
-        inputs->capacity = capacity;
+    const vsh_result result = known
+                                  ? VSH_OK
+                                  : vshi_make_room((void **)&inputs->paths, inputs->count, &inputs->capacity,
+                                                   sizeof *inputs->paths, "inputs", error);
+    if (known || result != VSH_OK) {
+        free(path);
+        return result;
     }
     inputs->paths[inputs->count++] = path;
     return VSH_OK;
@@ -58,13 +57,8 @@ static vsh_result copy_path(file_list *inputs, const char *path, vsh_error *erro
     return path != NULL ? add_path(inputs, strdup(path), error) : VSH_OK;
 }
 
-static vsh_result add_beside(void *user, char *path, vsh_error *error) {
-    return add_path(user, path, error);
-}
-
-/* Finds `files`, then the files of casters, receivers and lights, then what is read with the models among
- * them (model/model.h); each path once. `scene` may be NULL. Files that cannot be read are listed all
- * the same. Free the inputs also where it fails. */
+/* Lists `files`, the files of casters, receivers and lights, then the files beside models (model/model.h),
+ * readable or not. `scene` may be NULL. Free the inputs also after an error. */
 static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, size_t file_count,
                               const vsh_run *run, vshi_job *job, file_list *inputs, vsh_error *error) {
     for (size_t i = 0; i < file_count; ++i) {
@@ -82,7 +76,7 @@ static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, 
     }
     const size_t named = inputs->count;
     for (size_t i = 0; i < named; ++i) {
-        VSHI_TRY(vshi_model_beside(inputs->paths[i], run, job, add_beside, inputs, error));
+        VSHI_TRY(vshi_model_beside(inputs->paths[i], run, job, add_path, inputs, error));
     }
     return VSH_OK;
 }
@@ -92,7 +86,6 @@ static void free_inputs(file_list *inputs) {
         free(inputs->paths[i]);
     }
     free(inputs->paths);
-    *inputs = (file_list){NULL, 0, 0};
 }
 
 static vsh_result check_output(const char *output, const struct stat *status, const file_list *inputs,
@@ -151,7 +144,7 @@ static vsh_result add(vsh_provenance *p, const char *name, const char *value, vs
 
 static const char MAX_ERROR[] = ", max error ", RAYS_GIVEN[] = " rays";
 
-/* Of methods that cast rays: how many, which, and to what error. */
+/* Describes the rays of a method: their error, number and sampler. */
 static void describe_rays(const vsh_shade_options *o, bool adaptive, char *text, size_t size) {
     int used = 0;
     if (adaptive) {
@@ -175,8 +168,8 @@ static vsh_result add_method(vsh_provenance *p, const vsh_provenance_source *sou
                              bool ao, const char *what, vsh_error *error) {
     char text[LINE_SIZE], more[LINE_SIZE / 2] = "";
     const vsh_shade_options *o = &source->scene->shade;
-    const int32_t method = ao ? vsh_ao_method_resolve(o->ao_method, source->has_triangles)
-                              : vsh_shadow_method_resolve(o->method, source->has_triangles);
+    const int32_t method = ao ? vshi_ao_method_resolve(o->ao_method, source->has_triangles)
+                              : vshi_shadow_method_resolve(o->method, source->has_triangles);
     const uint32_t traits = ao ? vsh_ao_method_traits(method) : vsh_shadow_method_traits(method);
     if ((traits & VSH_METHOD_RAYS) != 0) {
         describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
@@ -283,7 +276,7 @@ const vsh_attribute *vsh_provenance_attributes(const vsh_provenance *provenance,
     return provenance != NULL ? provenance->attributes.list : NULL;
 }
 
-double vsh_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel) {
+double vshi_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel) {
     VSHI_NUMBERS;
     const char *name = strcmp(channel, "ao") == 0            ? "vdbshade_ao"
                        : strcmp(channel, "sky") == 0         ? "vdbshade_sky"

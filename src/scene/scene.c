@@ -5,37 +5,36 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "model/model.h"
+#include "shade/occluders.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <vdbshade/image.h>
+#include <vdbshade/picture.h>
 
 enum { MAX_ITEMS = 65536 };
 
 /* --- receivers */
 
-vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, int32_t *width, int32_t *height) {
+vsh_result vshi_read_size(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 1.0, .highest = VSH_MAX_LIGHTMAP_SIZE};
+    int32_t *size = member;
     if (!json_is_array(value->json)) {
-        const vsh_result result = vshi_read_value(reader, value, &key, width);
-        *height = *width;
-        return result;
+        VSHI_TRY(vshi_read_value(reader, value, &key, &size[0]));
+        size[1] = size[0];
+        return VSH_OK;
     }
     const size_t count = json_array_size(value->json);
     if (count != 2) {
         return vshi_json_fail(reader, value, "expected 2 numbers, found %zu", count);
     }
     const vshi_value first = vshi_item(value, 0), second = vshi_item(value, 1);
-    VSHI_TRY(vshi_read_value(reader, &first, &key, width));
-    return vshi_read_value(reader, &second, &key, height);
+    VSHI_TRY(vshi_read_value(reader, &first, &key, &size[0]));
+    return vshi_read_value(reader, &second, &key, &size[1]);
 }
-
-static vsh_result read_size(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_receiver *receiver = member;
-    return vshi_read_size(reader, value, &receiver->width, &receiver->height);
-}
+_Static_assert(offsetof(vsh_receiver, height) == offsetof(vsh_receiver, width) + sizeof(int32_t),
+               "a size is two integers in a row");
 
 vsh_result vshi_read_bits(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .lowest = 0.0, .highest = 32.0};
@@ -99,33 +98,26 @@ static const vshi_table plane_table = VSHI_TABLE(plane_keys);
 #undef AT
 
 /* Turns +y into the normal the shortest way, and moves the origin to the center, before the transform. */
-static void stand(const plane *p, double transform[12]) {
+static void place_plane(const plane *p, double transform[12]) {
     const double length =
         sqrt(p->normal[0] * p->normal[0] + p->normal[1] * p->normal[1] + p->normal[2] * p->normal[2]);
     const double a = p->normal[0] / length, b = p->normal[1] / length, c = p->normal[2] / length;
     const double s = b > -1.0 ? 1.0 / (1.0 + b) : 0.0; /* upside down: half a turn about x */
-    const double turned[3][4] = {{1.0 - a * a * s, a, -a * c * s, p->center[0]},
-                                 {-a, b, -c, p->center[1]},
-                                 {-a * c * s, c, b > -1.0 ? 1.0 - c * c * s : -1.0, p->center[2]}};
+    const double d = b > -1.0 ? 1.0 - c * c * s : -1.0;
+    const double turned[12] = {
+        1.0 - a * a * s, a, -a * c * s, p->center[0], -a, b, -c, p->center[1], -a * c * s, c, d, p->center[2],
+    };
     double before[12];
     memcpy(before, transform, sizeof before);
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 4; ++column) {
-            double sum = column == 3 ? before[4 * row + 3] : 0.0;
-            for (int k = 0; k < 3; ++k) {
-                sum += before[4 * row + k] * turned[k][column];
-            }
-            transform[4 * row + column] = sum;
-        }
-    }
+    vshi_model_compose(before, turned, transform);
 }
 
-/* Reads the plane after the other keys, as it stands before the transform. */
+/* Reads the plane after the other keys: it comes before the transform. */
 static vsh_result read_plane(vshi_json *reader, const vshi_value *value, vsh_receiver *receiver) {
     plane p = {.normal = {0.0, 1.0, 0.0}};
     VSHI_TRY(vshi_read_object(reader, value, &plane_table, 1, "a plane", &p));
     memcpy(receiver->extent, p.size, sizeof p.size);
-    stand(&p, receiver->transform);
+    place_plane(&p, receiver->transform);
     receiver->path = "plane";
     return VSH_OK;
 }
@@ -145,53 +137,46 @@ static const vshi_key receiver_keys[] = {
     VSHI_KEY("transform", CUSTOM, AT(transform), .read = vshi_read_transform),
     VSHI_KEY("uv_set", INTEGER, AT(uv_set), .variants = MESH, .highest = VSH_MAX_UV_SETS - 1,
              VSHI_OPTION("uv-set", "N", TEXELS, "UV set of the lightmap",
-                         .otherwise = "the second where there is one, else the first")),
+                         .otherwise = "the second if there is one, else the first")),
     VSHI_KEY("objects", CUSTOM, AT(objects.only), .variants = MESH, .read = vshi_read_patterns),
     VSHI_KEY("except", CUSTOM, AT(objects.except), .variants = MESH, .read = vshi_read_patterns),
     VSHI_KEY("allow_overlap", BOOL, AT(allow_overlap), .variants = MESH,
-             VSHI_OPTION(
-                 "allow-overlap", NULL, FILE_ONLY,
-                 "bake objects that lie over each other in the lightmap, too: the first keeps the texels")),
+             VSHI_OPTION("allow-overlap", NULL, FILE_ONLY,
+                         "bake objects that overlap in the lightmap, too: the first keeps the texels")),
     VSHI_KEY("unwrap", NAME, AT(unwrap), .variants = MESH, .names = VSH_NAMES_RECEIVER_UNWRAP,
              VSHI_OPTION("unwrap", "MODE", TEXELS,
-                         "make lightmap UVs: always, or (auto) where the file's own cannot be baked",
+                         "make lightmap UVs: always, or (auto) if the file's own cannot be baked",
                          .otherwise = "auto for .glb and .gltf, never for images")),
     VSHI_KEY("texels_per_unit", NUMBER, AT(texels_per_unit), .variants = MESH, VSHI_POSITIVE,
-             VSHI_OPTION("texels-per-unit", "N", TEXELS,
-                         "density of UVs that are made, texels along a scene unit",
+             VSHI_OPTION("texels-per-unit", "N", TEXELS, "density of new UVs, texels along a scene unit",
                          .otherwise = "the most that fit")),
-    VSHI_KEY(
-        "pages", INTEGER, AT(pages), .variants = MESH, .lowest = 1.0, .highest = VSH_MAX_PAGES,
-        VSHI_OPTION("pages", "N", TEXELS,
-                    "images of --size that may be filled with UVs that are made: OUT.0.exr, OUT.1.exr, …",
-                    .otherwise = "1; with --texels-per-unit as many as it takes")),
+    VSHI_KEY("pages", INTEGER, AT(pages), .variants = MESH, .lowest = 1.0, .highest = VSH_MAX_PAGES,
+             VSHI_OPTION("pages", "N", TEXELS,
+                         "images of --size that new UVs may fill: OUT.0.exr, OUT.1.exr, …",
+                         .otherwise = "1; with --texels-per-unit as many as needed")),
     VSHI_KEY("density", CUSTOM, .variants = MESH, .read = read_density),
     VSHI_KEY("atlas", NAME, AT(atlas), .variants = MESH, .names = VSH_NAMES_ATLAS,
              VSHI_OPTION("atlas", "WHAT", FILE_ONLY,
-                         "objects: an image for each object, OUT.NAME.exr, whose UVs, where they are made, "
-                         "are packed alone; shared: all lie on the same")),
+                         "objects: an image for each object, OUT.NAME.exr; shared: the same images")),
     VSHI_KEY("max_size", INTEGER, AT(max_size), .variants = MESH, .lowest = 1.0,
              .highest = VSH_MAX_LIGHTMAP_SIZE,
              VSHI_OPTION("max-size", "N", FILE_ONLY,
-                         "with --texels-per-unit, instead of --size: images are as small as what lies on "
-                         "them allows, their sides powers of two up to N",
-                         .otherwise = "--size is that of all")),
-    VSHI_KEY("size", CUSTOM, .read = read_size,
+                         "with --texels-per-unit: images as small as they can be, sides up to N",
+                         .otherwise = "--size for all")),
+    VSHI_KEY("size", CUSTOM, AT(width), .read = vshi_read_size,
              VSHI_OPTION("size", "W[xH]", IMAGE, "texels of the lightmap",
                          .range = "W or WxH, each from 1 to 65536 texels", .otherwise = "1024", .by = true)),
     VSHI_KEY("supersample", INTEGER, AT(supersample), .lowest = 1.0, .highest = 16.0,
              VSHI_OPTION("supersample", "N", TEXELS, "N × N samples a texel")),
+    VSHI_KEY("padding", CUSTOM, AT(padding), .read = read_padding,
+             VSHI_OPTION("padding", "N", TEXELS,
+                         "texels by which charts grow; auto: fill all, for mip levels",
+                         .range = "a whole number from 0 to 4096, or auto", .otherwise = "4")),
     VSHI_KEY(
-        "padding", CUSTOM, AT(padding), .read = read_padding,
-        VSHI_OPTION(
-            "padding", "N", TEXELS,
-            "texels that charts are grown by; auto: all is filled, so that no mip level reads background",
-            .range = "a whole number from 0 to 4096, or auto", .otherwise = "4")),
-    VSHI_KEY("seams", NAME, AT(seams), .variants = MESH, .names = VSH_NAMES_SEAMS,
-             VSHI_OPTION("seams", "WHAT", TEXELS,
-                         "fix: values on both sides of a chart's border are made to agree where the surface "
-                         "is smooth, moved by up to --max-error",
-                         .otherwise = "fix for .glb and .gltf, keep for images")),
+        "seams", NAME, AT(seams), .variants = MESH, .names = VSH_NAMES_SEAMS,
+        VSHI_OPTION("seams", "WHAT", TEXELS,
+                    "fix: values at borders of charts move by up to --max-error, so that both sides agree",
+                    .otherwise = "fix for .glb and .gltf, keep for images")),
     VSHI_KEY("ao_spacing", INTEGER, AT(ao_spacing), .lowest = 1.0, .highest = 8.0,
              VSHI_OPTION("ao-spacing", "N", FILE_ONLY,
                          "texels: above 1, texels share the rays of AO by exact and adaptive",
@@ -199,11 +184,11 @@ static const vshi_key receiver_keys[] = {
     VSHI_KEY("output", PATH, AT(output), .required = VSHI_ALL),
     VSHI_KEY("bits", CUSTOM, AT(bits), .read = vshi_read_bits,
              VSHI_OPTION("bits", "N", IMAGE, "bits a channel", .range = "8, 16 or 32",
-                         .otherwise = "32 for EXR, else 16 where the format has it, else 8")),
+                         .otherwise = "32 for EXR, else 16 if the format has it, else 8")),
     VSHI_KEY("pack", STRING, AT(pack),
              VSHI_OPTION("pack", "R=NAME,…", IMAGE,
-                         "what goes where in formats that cannot name channels: R=shadow.sun,G=ao,A=A; 0 and "
-                         "1 are constants; rgb: the irradiance, or shadow * ao in grey",
+                         "channels of formats without names: R=shadow.sun,G=ao,A=A; 0 and 1 are constants; "
+                         "rgb: the irradiance, or shadow * ao in grey",
                          .otherwise = "irradiance or the first three but A to R, G, B; A to A; EXR: all by "
                                       "name and the picture; channels: without the picture")),
     VSHI_KEY("color_space", NAME, AT(color_space), .name_of = vshi_color_space_key,
@@ -215,20 +200,17 @@ static const vshi_table receiver_table = VSHI_TABLE(receiver_keys);
 #undef AT
 
 static vsh_result read_receiver(vshi_json *reader, const vshi_value *value, void *member) {
+    static const char *const keys[] = {"mesh", "heightfield", "plane"};
+    static const char *const whats[] = {"a receiver", "a heightfield receiver", "a plane receiver"};
     vsh_receiver *receiver = member;
+    vshi_value given;
     *receiver = vsh_receiver_default();
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    VSHI_TRY(vshi_reject_both(reader, value, "mesh", "heightfield"));
-    VSHI_TRY(vshi_reject_both(reader, value, "mesh", "plane"));
-    VSHI_TRY(vshi_reject_both(reader, value, "heightfield", "plane"));
-    static const char *const whats[] = {"a receiver", "a heightfield receiver", "a plane receiver"};
-    vshi_value given;
-    receiver->type = vshi_member(value, "heightfield", &given) ? VSH_RECEIVER_HEIGHTFIELD
-                     : vshi_member(value, "plane", &given)     ? VSH_RECEIVER_PLANE
-                                                               : VSH_RECEIVER_MESH;
+    VSHI_TRY(vshi_read_type(reader, value, keys, 3, &receiver->type));
+    receiver->type = receiver->type < 0 ? VSH_RECEIVER_MESH : receiver->type;
     VSHI_TRY(vshi_read_object(reader, value, &receiver_table, 1U << receiver->type, whats[receiver->type],
                               receiver));
-    return receiver->type == VSH_RECEIVER_PLANE ? read_plane(reader, &given, receiver) : VSH_OK;
+    return vshi_member(value, "plane", &given) ? read_plane(reader, &given, receiver) : VSH_OK;
 }
 
 /* --- scenes */
@@ -240,14 +222,14 @@ static vsh_result read_light_names(vshi_json *reader, const vshi_value *value, v
     const vshi_key key = {.kind = VSHI_STRING};
     const size_t count = json_array_size(value->json);
     const char **names;
-    /* one more: no lights at all are not NULL, which is all of them */
+    /* one more, so that a list without lights is not NULL: that stands for all lights */
     VSHI_TRY(vshi_json_allocate(reader, (void **)&names, count + 1, sizeof *names, "lights of a layer"));
     for (size_t i = 0; i < count; ++i) {
         const vshi_value name = vshi_item(value, i);
         VSHI_TRY(vshi_read_value(reader, &name, &key, &names[i]));
     }
-    layer->shade.lights = names;
-    layer->shade.light_count = count;
+    layer->lights = names;
+    layer->light_count = count;
     return VSH_OK;
 }
 
@@ -257,26 +239,26 @@ static const vshi_key layer_keys[] = {
     VSHI_KEY("voxel_size", NUMBER, AT(voxel_size), .lowest = VSHI_SMALLEST_LENGTH,
              .highest = VSHI_LARGEST_VOXEL),
     VSHI_KEY("resolution", INTEGER, AT(resolution), .lowest = 2.0, .highest = 65536.0),
-    VSHI_KEY("method", NAME, AT(shade.method), .names = VSH_NAMES_SHADOW),
-    VSHI_KEY("combine", NAME, AT(shade.combine), .names = VSH_NAMES_COMBINE),
-    VSHI_KEY("softness", NUMBER, AT(shade.softness), .highest = 1000.0),
-    VSHI_KEY("remap", VECTOR, AT(shade.remap), .highest = 1.0, .count = 2),
-    VSHI_KEY("start_offset", NUMBER, AT(shade.start_offset), .highest = 16.0),
+    VSHI_KEY("method", NAME, AT(method), .names = VSH_NAMES_SHADOW),
+    VSHI_KEY("combine", NAME, AT(combine), .names = VSH_NAMES_COMBINE),
+    VSHI_KEY("softness", NUMBER, AT(softness), .highest = 1000.0),
+    VSHI_KEY("remap", VECTOR, AT(remap), .highest = 1.0, .count = 2),
+    VSHI_KEY("start_offset", NUMBER, AT(start_offset), .highest = 16.0),
     VSHI_KEY("lights", CUSTOM, .read = read_light_names),
-    VSHI_KEY("ao", BOOL, AT(shade.ao)),
+    VSHI_KEY("ao", BOOL, AT(ao)),
 };
 static const vshi_table layer_table = VSHI_TABLE(layer_keys);
 #undef AT
 
 static vsh_result read_layer(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_scene_layer *layer = member;
-    layer->shade = vsh_layer_default();
+    *layer = vsh_scene_layer_default();
     VSHI_TRY(vshi_read_object(reader, value, &layer_table, 1, "a layer", layer));
     VSHI_TRY(vshi_reject_both(reader, value, "voxel_size", "resolution"));
     vshi_value remap;
-    if (vshi_member(value, "remap", &remap) && !(layer->shade.remap[0] < layer->shade.remap[1])) {
+    if (vshi_member(value, "remap", &remap) && !(layer->remap[0] < layer->remap[1])) {
         return vshi_json_fail(reader, &remap, "expected two numbers that rise, found %g and %g",
-                              layer->shade.remap[0], layer->shade.remap[1]);
+                              layer->remap[0], layer->remap[1]);
     }
     return VSH_OK;
 }
@@ -293,13 +275,12 @@ static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, cons
     vsh_result result = VSH_OK;
     VSHI_TRY(
         vshi_allocate((void **)&sorted, scene->receiver_count, sizeof *sorted, "receivers", reader->error));
-    if (sorted == NULL) {
-        return VSH_OK;
-    }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         sorted[i] = &scene->receivers[i];
     }
-    qsort(sorted, scene->receiver_count, sizeof *sorted, by_output);
+    if (sorted != NULL) {
+        qsort(sorted, scene->receiver_count, sizeof *sorted, by_output);
+    }
     for (size_t i = 1; i < scene->receiver_count; ++i) {
         const vshi_value receiver = vshi_item(value, (size_t)(sorted[i] - scene->receivers));
         vshi_value output;
@@ -317,7 +298,7 @@ static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, cons
 
 static void count_bent(void *target) {
     vsh_scene *scene = target;
-    ++scene->bent; /* behind 0, which is none */
+    ++scene->bent; /* 0 is none */
 }
 
 #define AT(member) .offset = offsetof(vsh_scene, member)
@@ -327,15 +308,14 @@ static const vshi_key ao_keys[] = {
              VSHI_OPTION("ao", "DISTANCE", OCCLUSION, "ambient occlusion within a distance, scene units",
                          .otherwise = "none")),
     VSHI_KEY("method", NAME, AT(shade.ao_method), .names = VSH_NAMES_AO,
-             VSHI_OPTION("ao-method", "NAME", OCCLUSION, "of AO; cones and taps are previews")),
+             VSHI_OPTION("ao-method", "NAME", OCCLUSION, "method of AO; cones and taps are previews")),
     VSHI_KEY("cones", INTEGER, AT(shade.ao_cones),
              .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
              .lowest = 1.0, .highest = 256.0),
     VSHI_KEY("bent_normals", NAME, AT(bent), .variants = ~(1U << VSH_AO_TAPS), .names = VSH_NAMES_BENT,
              .then = count_bent,
              VSHI_OPTION("bent-normals", "SPACE", CHANNELS,
-                         "with --ao also bent.X, .Y, .Z: the mean direction that is open, in world or "
-                         "tangent space; -1 to 1, in integer formats (1 + x) / 2",
+                         "with --ao also bent.X, .Y, .Z: the mean open direction, in world or tangent space",
                          .otherwise = "none")),
 };
 const vshi_table vshi_ao_table = VSHI_TABLE(ao_keys);
@@ -370,7 +350,7 @@ static vsh_result read_tint(vshi_json *reader, const vshi_value *value, void *me
 
 static void drop_voxel_size(void *target) {
     vsh_scene *scene = target;
-    scene->grid.voxel_size = 0.0; /* which would stand in its place */
+    scene->grid.voxel_size = 0.0; /* it would overrule the resolution */
 }
 
 /* A name, or metres. */
@@ -380,7 +360,7 @@ static vsh_result read_unit(vshi_json *reader, const vshi_value *value, void *me
     if (!json_is_string(value->json)) {
         return vshi_read_value(reader, value, &metres, &scene->unit);
     }
-    scene->unit = vsh_unit(json_string_value(value->json));
+    scene->unit = vshi_find_unit(json_string_value(value->json));
     return scene->unit > 0.0 ? VSH_OK
                              : vshi_json_fail(reader, value, "\"%.64s\" is none of m, cm, mm, in, ft",
                                               json_string_value(value->json));
@@ -392,8 +372,8 @@ static const vshi_key scene_keys[] = {
     VSHI_KEY("voxel_size", NUMBER, AT(grid.voxel_size), .lowest = VSHI_SMALLEST_LENGTH,
              .highest = VSHI_LARGEST_VOXEL, .flag = offsetof(vsh_scene, voxels_named),
              VSHI_OPTION("voxel-size", "SIZE", CASTERS,
-                         "in place of --resolution: the edge of a voxel, scene units",
-                         .otherwise = "as --resolution says")),
+                         "instead of --resolution: the edge of a voxel, scene units",
+                         .otherwise = "by --resolution")),
     VSHI_KEY("resolution", INTEGER, AT(grid.resolution), .lowest = 2.0, .highest = 65536.0,
              .flag = offsetof(vsh_scene, voxels_named), .then = drop_voxel_size,
              VSHI_OPTION("resolution", "N", CASTERS, "voxels along the longest side of the casters",
@@ -403,52 +383,47 @@ static const vshi_key scene_keys[] = {
     VSHI_KEY("shell_thickness", NUMBER, AT(grid.shell_thickness), .lowest = 1.0, .highest = 50.0,
              VSHI_OPTION("shell-thickness", "VOXELS", LEVEL_SET,
                          "thickness of sheets and of walls behind rooms' faces")),
-    VSHI_KEY("layers", LIST, AT(layers), .highest = VSH_MAX_LAYERS, .read = read_layer,
+    VSHI_KEY("layers", LIST, AT(layers), .highest = VSHI_MAX_LAYERS, .read = read_layer,
              .count = sizeof(vsh_scene_layer)),
-    {.name = "lights", .kind = VSHI_LATER},
+    VSHI_KEY("lights", LATER, .offset = 0),
     VSHI_KEY("ao", CUSTOM, .read = read_ao),
     VSHI_KEY(
         "irradiance", BOOL, AT(irradiance),
-        VSHI_OPTION(
-            "irradiance", NULL, CHANNELS,
-            "also irradiance.R, .G, .B: visibility × colour × falloff × cosine, summed, × AO where baked")),
-    VSHI_KEY(
-        "ambient", VECTOR, AT(ambient), .highest = VSHI_LARGEST, .count = 3,
-        .flag = offsetof(vsh_scene, has_ambient),
-        VSHI_OPTION("ambient", "R,G,B", CHANNELS,
-                    "light from all around, linear: irradiance is then that of the lights + ambient × AO",
-                    .otherwise = "none")),
+        VSHI_OPTION("irradiance", NULL, CHANNELS,
+                    "also irradiance.R, .G, .B: Σ visibility × colour × falloff × cosine, × AO if baked")),
+    VSHI_KEY("ambient", VECTOR, AT(ambient), .highest = VSHI_LARGEST, .count = 3,
+             .flag = offsetof(vsh_scene, has_ambient),
+             VSHI_OPTION("ambient", "R,G,B", CHANNELS,
+                         "light from all around, linear: irradiance is that of lights + ambient × AO",
+                         .otherwise = "none")),
     VSHI_KEY("tint", CUSTOM, .read = read_tint,
              VSHI_OPTION("tint", "TINT", FILE_ONLY,
-                         "also tint.NAME.R, .G, .B of each light, its penumbra coloured: (V, V²/2 + V/2, V²) "
-                         "or powers of V such as 1,1.2,1.5; irradiance takes it too",
+                         "also tint.NAME.R, .G, .B: coloured penumbrae, (V, V²/2 + V/2, V²) or powers of V",
                          .range = "quadratic, or R,G,B: powers from 0.0625 to 16", .otherwise = "none")),
     VSHI_KEY(
         "method", NAME, AT(shade.method), .names = VSH_NAMES_SHADOW,
         VSHI_OPTION("method", "NAME", OCCLUSION,
-                    "of the shadow; auto: exact, or adaptive if the casters are only a .vdb file, or only "
-                    "masks and text; methods other than these and rays are previews and promise no "
-                    "error; classic, practical and improved have only the outer half of the penumbra")),
+                    "method of shadows; auto: exact, or adaptive for a .vdb file, or for masks and text; all "
+                    "but these and rays are previews")),
     VSHI_KEY("rays", INTEGER, AT(shade.rays), .lowest = 1.0, .highest = 4096.0,
              VSHI_OPTION("rays", "N", ACCURACY, "rays a texel; with adaptive and exact a limit",
-                         .otherwise = "64, or as many as the error takes")),
+                         .otherwise = "64, or as many as the error needs")),
     VSHI_KEY("sampler", NAME, AT(shade.sampler), .names = VSH_NAMES_SAMPLER,
-             VSHI_OPTION("sampler", "NAME", FILE_ONLY, "where they go")),
+             VSHI_OPTION("sampler", "NAME", FILE_ONLY, "pattern of the rays")),
     VSHI_KEY("frame", INTEGER, AT(shade.frame), .highest = INT32_MAX,
              VSHI_OPTION("frame", "N", FILE_ONLY,
-                         "another set of them: bakes of frames 0, 1, 2 … may be averaged")),
+                         "another set of rays: bakes of frames 0, 1, 2 … may be averaged")),
     VSHI_KEY("early_rays", INTEGER, AT(shade.early_rays), .highest = 4096.0,
              VSHI_OPTION("early-rays", "N", FILE_ONLY,
-                         "with rays: where the first N agree, the rest are not marched",
+                         "with rays: if the first N agree, the rest are not marched",
                          .otherwise = "0: never")),
-    VSHI_KEY("max_error", NUMBER, AT(shade.max_error), .lowest = 1e-4, .highest = 1.0,
-             VSHI_OPTION("max-error", "E", ACCURACY,
-                         "standard error that a value may keep, which rays follow from; takes the place of a "
-                         "scene's preview methods by auto")),
     VSHI_KEY(
-        "jitter", NUMBER, AT(shade.jitter), .highest = 1.0,
-        VSHI_OPTION("jitter", "J", FILE_ONLY,
-                    "shadows by one march: steps are shortened by a part of up to this, another a texel")),
+        "max_error", NUMBER, AT(shade.max_error), .lowest = 1e-4, .highest = 1.0,
+        VSHI_OPTION("max-error", "E", ACCURACY,
+                    "standard error of a value, by as many rays as needed; preview methods become auto")),
+    VSHI_KEY("jitter", NUMBER, AT(shade.jitter), .highest = 1.0,
+             VSHI_OPTION("jitter", "J", FILE_ONLY,
+                         "shadows by one march: the largest share by which a texel's steps are shorter")),
     VSHI_KEY(
         "error", BOOL, AT(error),
         VSHI_OPTION("error", NULL, ACCURACY,
@@ -456,18 +431,18 @@ static const vshi_key scene_keys[] = {
     VSHI_KEY("invalid", BOOL, AT(planes.invalid),
              VSHI_OPTION("invalid-channel", NULL, FILE_ONLY,
                          "also the channel invalid: 1 for texels inside solids or behind walls, else 0")),
-    VSHI_KEY("sky", NAME, AT(planes.sky), .names = VSH_NAMES_UP,
-             VSHI_OPTION("sky", "AXIS", CHANNELS,
-                         "also sky: what of an even sky is seen, however far the casters; up is this axis")),
+    VSHI_KEY(
+        "sky", NAME, AT(planes.sky), .names = VSH_NAMES_UP,
+        VSHI_OPTION("sky", "AXIS", CHANNELS, "also sky: the visible share of an even sky over this axis")),
     VSHI_KEY("max_steps", INTEGER, AT(shade.max_steps), .lowest = 16.0, .highest = 65536.0,
-             VSHI_OPTION("max-steps", "N", FILE_ONLY, "steps after which a ray is given up")),
+             VSHI_OPTION("max-steps", "N", FILE_ONLY, "steps after which a ray ends")),
     VSHI_KEY("start_offset", NUMBER, AT(shade.start_offset), .highest = 16.0,
              VSHI_OPTION("start-offset", "VOXELS", FILE_ONLY,
-                         "how far above the surface rays begin, along its normal")),
+                         "distance from the surface to the start of rays, along the normal")),
     VSHI_KEY("unit", CUSTOM, .read = read_unit,
-             VSHI_OPTION("unit", "UNIT", CASTERS, "of the numbers in mesh files",
+             VSHI_OPTION("unit", "UNIT", CASTERS, "unit of the numbers in mesh files",
                          .range = "m, cm, mm, in, ft, or metres",
-                         .otherwise = "as FBX and DAE say; OBJ, PLY and STL stay as they are")),
+                         .otherwise = "that of FBX and DAE files; OBJ, PLY and STL stay as they are")),
     VSHI_KEY("cast_blended", BOOL, AT(cast_blended),
              VSHI_OPTION("cast-blended", NULL, CASTERS, "meshes of blended materials (glass) cast too")),
     VSHI_KEY("receivers", LIST, AT(receivers), .highest = MAX_ITEMS, .read = read_receiver,
@@ -479,16 +454,16 @@ _Static_assert(offsetof(vsh_scene, caster_count) == offsetof(vsh_scene, casters)
                    offsetof(vsh_scene, receiver_count) == offsetof(vsh_scene, receivers) + sizeof(void *),
                "lists are as vshi_list");
 
-static bool is_named(const vsh_scene *scene, const char *path) {
-    bool named = false;
-    for (size_t i = 0; i < scene->caster_count && !named; ++i) {
+static bool has_terrain(const vsh_scene *scene, const char *path) {
+    bool found = false;
+    for (size_t i = 0; i < scene->caster_count && !found; ++i) {
         const vsh_caster *caster = &scene->casters[i];
-        named = caster->type == VSH_CASTER_HEIGHTFIELD && strcmp(caster->path, path) == 0;
+        found = caster->type == VSH_CASTER_HEIGHTFIELD && strcmp(caster->path, path) == 0;
     }
-    return named;
+    return found;
 }
 
-/* Terrains that receive also cast, where the scene does not name them as casters. */
+/* Adds casters for terrains that receive, unless the scene names them as casters. */
 static vsh_result add_terrains(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
     size_t count = 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
@@ -506,7 +481,7 @@ static vsh_result add_terrains(vshi_json *reader, const vshi_value *root, vsh_sc
     scene->casters = casters;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const vsh_receiver *receiver = &scene->receivers[i];
-        if (receiver->type == VSH_RECEIVER_HEIGHTFIELD && !is_named(scene, receiver->path)) {
+        if (receiver->type == VSH_RECEIVER_HEIGHTFIELD && !has_terrain(scene, receiver->path)) {
             vsh_caster *caster = &casters[scene->caster_count++];
             *caster = vsh_caster_default();
             caster->type = VSH_CASTER_HEIGHTFIELD;
@@ -521,7 +496,7 @@ static vsh_result add_terrains(vshi_json *reader, const vshi_value *root, vsh_sc
 
 /* --- layers */
 
-/* The number of the layer, or of the light, of that name; SIZE_MAX: there is none. */
+/* The number of the layer of that name; SIZE_MAX: there is none. */
 static size_t find_layer(const vsh_scene *scene, const char *name) {
     for (size_t k = 0; k < scene->layer_count; ++k) {
         if (strcmp(scene->layers[k].name, name) == 0) {
@@ -531,126 +506,104 @@ static size_t find_layer(const vsh_scene *scene, const char *name) {
     return SIZE_MAX;
 }
 
-static size_t find_light(const vsh_scene *scene, const char *name) {
-    for (size_t i = 0; i < scene->light_count; ++i) {
-        if (strcmp(scene->lights[i].name, name) == 0) {
-            return i;
-        }
+static bool has_light(const vsh_scene *scene, const char *name) {
+    bool found = false;
+    for (size_t i = 0; i < scene->light_count && !found; ++i) {
+        found = strcmp(scene->lights[i].name, name) == 0;
     }
-    return SIZE_MAX;
+    return found;
 }
 
-static vsh_result check_casters(vshi_json *reader, const vshi_value *root, const vsh_scene *scene) {
-    vshi_value casters, name;
-    for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &casters); ++i) {
-        const char *layer = scene->casters[i].layer;
-        const vshi_value caster = vshi_item(&casters, i);
-        if (layer != NULL && find_layer(scene, layer) == SIZE_MAX && vshi_member(&caster, "layer", &name)) {
-            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers", layer);
-        }
-    }
-    return VSH_OK;
+/* Fails if an item of a list names a layer that the scene does not have. */
+static vsh_result check_layer(vshi_json *reader, const vshi_value *value, const vsh_scene *scene) {
+    VSHI_TRY(vshi_expect(reader, value, JSON_STRING));
+    const char *name = json_string_value(value->json);
+    return find_layer(scene, name) != SIZE_MAX
+               ? VSH_OK
+               : vshi_json_fail(reader, value, "\"%.64s\" is none of the scene's layers", name);
 }
 
-/* Whether a light is among those that a layer casts for. */
-static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
-    bool casts = layer->lights == NULL;
+/* Whether a layer casts for a light: both may name the other. */
+static bool casts_for(const vsh_scene_layer *layer, const char *name, const vsh_light *light,
+                      const vshi_value *item) {
+    vshi_value names;
+    bool casts = layer->lights == NULL, named = !vshi_member(item, "layers", &names);
     for (size_t i = 0; !casts && i < layer->light_count; ++i) {
         casts = strcmp(layer->lights[i], light->name) == 0;
     }
-    return casts;
-}
-
-static vsh_result check_lights(vshi_json *reader, const vshi_value *layers, const vsh_scene *scene,
-                               size_t i) {
-    const vsh_layer *layer = &scene->layers[i].shade;
-    const vshi_value at = vshi_item(layers, i);
-    vshi_value names;
-    for (size_t k = 0; layer->lights != NULL && k < layer->light_count; ++k) {
-        if (find_light(scene, layer->lights[k]) == SIZE_MAX && vshi_member(&at, "lights", &names)) {
-            const vshi_value name = vshi_item(&names, k);
-            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's lights", layer->lights[k]);
-        }
+    for (size_t i = 0; !named && i < json_array_size(names.json); ++i) {
+        named = strcmp(json_string_value(json_array_get(names.json, i)), name) == 0;
     }
-    return VSH_OK;
+    return casts && named;
 }
 
-/* Takes a light from those that a layer casts for. */
-static vsh_result take_out(vshi_json *reader, const vsh_scene *scene, const vsh_light *light,
-                           vsh_layer *layer) {
-    const char **left;
-    size_t count = 0;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&left, scene->light_count + 1, sizeof *left,
-                                "lights of a layer"));
+/* Lists the lights that each layer casts for, if lights name layers. */
+static vsh_result choose_lights(vshi_json *reader, const vshi_value *lights, vsh_scene *scene) {
+    bool choose = false;
     for (size_t l = 0; l < scene->light_count; ++l) {
-        if (&scene->lights[l] != light && casts_for(layer, &scene->lights[l])) {
-            left[count++] = scene->lights[l].name;
+        const vshi_value light = vshi_light_item(lights, scene, l);
+        vshi_value names;
+        if (vshi_member(&light, "layers", &names)) {
+            choose = true;
+            VSHI_TRY(vshi_expect(reader, &names, JSON_ARRAY));
+            for (size_t n = 0; n < json_array_size(names.json); ++n) {
+                const vshi_value name = vshi_item(&names, n);
+                VSHI_TRY(check_layer(reader, &name, scene));
+            }
         }
     }
-    layer->lights = left;
-    layer->light_count = count;
-    return VSH_OK;
-}
-
-/* A light that names layers: the others do not cast for it. */
-static vsh_result choose_layers(vshi_json *reader, const vshi_value *names, const vsh_light *light,
-                                const vsh_scene *scene, vsh_scene_layer *layers) {
-    bool named[VSH_MAX_LAYERS] = {false};
-    VSHI_TRY(vshi_expect(reader, names, JSON_ARRAY));
-    for (size_t n = 0; n < json_array_size(names->json); ++n) {
-        const vshi_value name = vshi_item(names, n);
-        VSHI_TRY(vshi_expect(reader, &name, JSON_STRING));
-        const size_t layer = find_layer(scene, json_string_value(name.json));
-        if (layer == SIZE_MAX) {
-            return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's layers",
-                                  json_string_value(name.json));
-        }
-        named[layer] = true;
-    }
-    for (size_t k = 0; k < scene->layer_count; ++k) {
-        if (!named[k] && casts_for(&layers[k].shade, light)) {
-            VSHI_TRY(take_out(reader, scene, light, &layers[k].shade));
-        }
-    }
-    return VSH_OK;
-}
-
-static vsh_result choose_all(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
-    vshi_value lights, names;
-    vsh_scene_layer *layers;
-    if (!vshi_member(root, "lights", &lights)) {
+    if (!choose || scene->layer_count == 0) {
         return VSH_OK;
     }
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&layers, scene->layer_count + 1, sizeof *layers, "layers"));
-    if (scene->layer_count > 0) {
-        memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
-    }
-    for (size_t l = 0; l < scene->light_count; ++l) {
-        const vshi_value light = vshi_light_item(&lights, scene, l);
-        if (vshi_member(&light, "layers", &names)) {
-            VSHI_TRY(choose_layers(reader, &names, &scene->lights[l], scene, layers));
+    vsh_scene_layer *layers;
+    VSHI_TRY(vshi_json_allocate(reader, (void **)&layers, scene->layer_count, sizeof *layers, "layers"));
+    memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
+    for (size_t k = 0; k < scene->layer_count; ++k) {
+        const char **names;
+        size_t count = 0;
+        VSHI_TRY(vshi_json_allocate(reader, (void **)&names, scene->light_count + 1, sizeof *names,
+                                    "lights of a layer"));
+        for (size_t l = 0; l < scene->light_count; ++l) {
+            const vshi_value light = vshi_light_item(lights, scene, l);
+            if (casts_for(&layers[k], layers[k].name, &scene->lights[l], &light)) {
+                names[count++] = scene->lights[l].name;
+            }
+        }
+        if (layers[k].lights != NULL || count < scene->light_count) {
+            layers[k].lights = names;
+            layers[k].light_count = count;
         }
     }
     scene->layers = layers;
     return VSH_OK;
 }
 
-/* Fails where casters and lights name layers, or layers lights, that the scene does not have; layers that a
- * light does not name where it names some cast for it no more. */
+/* Checks the names that casters, lights and layers have of each other. */
 static vsh_result check_layers(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
-    vshi_value layers, name;
-    VSHI_TRY(check_casters(reader, root, scene));
-    const bool layered = vshi_member(root, "layers", &layers);
-    for (size_t i = 0; layered && i < scene->layer_count; ++i) {
-        const vshi_value at = vshi_item(&layers, i);
-        const size_t first = find_layer(scene, scene->layers[i].name);
-        if (first < i && vshi_member(&at, "name", &name)) {
-            return vshi_json_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too",
-                                  scene->layers[i].name, first);
+    vshi_value list, lights, name;
+    for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &list); ++i) {
+        const vshi_value caster = vshi_item(&list, i);
+        if (scene->casters[i].layer != NULL && vshi_member(&caster, "layer", &name)) {
+            VSHI_TRY(check_layer(reader, &name, scene));
         }
-        VSHI_TRY(check_lights(reader, &layers, scene, i));
     }
-    return choose_all(reader, root, scene);
+    for (size_t i = 0; i < scene->layer_count && vshi_member(root, "layers", &list); ++i) {
+        const vsh_scene_layer *layer = &scene->layers[i];
+        const vshi_value item = vshi_item(&list, i);
+        const size_t first = find_layer(scene, layer->name);
+        if (first < i && vshi_member(&item, "name", &name)) {
+            return vshi_json_fail(reader, &name, "\"%.64s\" is the name of layers[%zu] too", layer->name,
+                                  first);
+        }
+        for (size_t k = 0; layer->lights != NULL && k < layer->light_count; ++k) {
+            if (!has_light(scene, layer->lights[k]) && vshi_member(&item, "lights", &lights)) {
+                name = vshi_item(&lights, k);
+                return vshi_json_fail(reader, &name, "\"%.64s\" is none of the scene's lights",
+                                      layer->lights[k]);
+            }
+        }
+    }
+    return vshi_member(root, "lights", &lights) ? choose_lights(reader, &lights, scene) : VSH_OK;
 }
 
 /* --- the scene */
@@ -711,7 +664,7 @@ void vsh_scene_free(vsh_scene *scene) {
 
 /* --- settings: keys that are also options */
 
-/* Where settings stand, and what their keys are called from the scene on. */
+/* Tables with settings, and the prefixes of their keys. */
 static const struct {
     const vshi_table *table;
     const char *prefix;
@@ -724,7 +677,7 @@ static const struct {
 };
 enum { PLACES = sizeof places / sizeof places[0] };
 
-static const vshi_key *key_at(size_t index, size_t *place) {
+static const vshi_key *find_key(size_t index, size_t *place) {
     for (*place = 0; *place < PLACES; ++*place) {
         const vshi_table *table = places[*place].table;
         for (size_t i = 0; i < table->key_count; ++i) {
@@ -736,37 +689,32 @@ static const vshi_key *key_at(size_t index, size_t *place) {
     return NULL;
 }
 
-static void tell_default(const vshi_key *key, int32_t owner, char *text, size_t size) {
+int32_t vsh_setting_get(size_t index, vsh_setting *setting) {
     const vsh_scene scene = vsh_scene_default();
     const vsh_receiver receiver = vsh_receiver_default();
     const vsh_flat_scene flat = vsh_flat_scene_default();
     const void *const defaults[] = {[VSH_SETTING_OF_SCENE] = &scene,
                                     [VSH_SETTING_OF_RECEIVER] = &receiver,
                                     [VSH_SETTING_OF_FLAT] = &flat};
-    if (key->option.otherwise != NULL) {
-        snprintf(text, size, "%s", key->option.otherwise);
-    } else {
-        vshi_key_value(key, defaults[owner], text, size);
-    }
-}
-
-int32_t vsh_setting_get(size_t index, vsh_setting *setting) {
     size_t place;
-    const vshi_key *key = key_at(index, &place);
+    const vshi_key *key = find_key(index, &place);
     if (key == NULL) {
         return 0;
     }
-    vsh_setting told;
-    memset(&told, 0, sizeof told);
-    snprintf(told.key, sizeof told.key, "%s%s", places[place].prefix, key->name);
-    snprintf(told.option, sizeof told.option, "%s", key->option.name);
-    snprintf(told.value, sizeof told.value, "%s", key->option.value != NULL ? key->option.value : "");
-    snprintf(told.help, sizeof told.help, "%s", key->option.help);
-    vshi_key_range(key, told.range, sizeof told.range);
-    tell_default(key, places[place].owner, told.otherwise, sizeof told.otherwise);
-    told.group = key->option.group;
-    told.owner = places[place].owner;
-    *setting = told;
+    const vshi_option *option = &key->option;
+    memset(setting, 0, sizeof *setting);
+    snprintf(setting->key, sizeof setting->key, "%s%s", places[place].prefix, key->name);
+    snprintf(setting->option, sizeof setting->option, "%s", option->name);
+    snprintf(setting->value, sizeof setting->value, "%s", option->value != NULL ? option->value : "");
+    snprintf(setting->help, sizeof setting->help, "%s", option->help);
+    vshi_key_range(key, setting->range, sizeof setting->range);
+    if (option->otherwise != NULL) {
+        snprintf(setting->otherwise, sizeof setting->otherwise, "%s", option->otherwise);
+    } else {
+        vshi_key_value(key, defaults[places[place].owner], setting->otherwise, sizeof setting->otherwise);
+    }
+    setting->group = option->group;
+    setting->owner = places[place].owner;
     return 1;
 }
 
@@ -776,7 +724,7 @@ static bool is_called(const vshi_key *key, const char *prefix, const char *name)
            (strncmp(name, prefix, length) == 0 && strcmp(name + length, key->name) == 0);
 }
 
-/* Sets what `target` holds, `size` bytes, unless the text is no value. */
+/* Sets a member of `target`, which has `size` bytes; a wrong text changes nothing. */
 static vsh_result set(int32_t owner, const char *name, const char *text, void *target, size_t size,
                       vsh_error *error) {
     static const char *const owners[] = {"scene", "receiver", "flat scene"};
@@ -787,7 +735,7 @@ static vsh_result set(int32_t owner, const char *name, const char *text, void *t
     } changed;
     size_t place;
     const vshi_key *key;
-    for (size_t i = 0; (key = key_at(i, &place)) != NULL; ++i) {
+    for (size_t i = 0; (key = find_key(i, &place)) != NULL; ++i) {
         if (places[place].owner == owner && is_called(key, places[place].prefix, name)) {
             memcpy(&changed, target, size);
             VSHI_TRY(vshi_read_text(key, name, text, &changed, error));

@@ -1,4 +1,4 @@
-/* Lightmap UVs that are made for receivers, and the pages of those that have some. */
+/* Pages of receivers, and lightmap UVs that are made for them. */
 #include "scene/assets.h"
 
 #include "base/job.h"
@@ -6,13 +6,13 @@
 #include "mesh/mesh.h"
 #include "model/model.h"
 
-#include <vdbshade/lit.h>
+#include <vdbshade/scene.h>
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Of a mesh's triangles, those without area in the UVs: what an exporter leaves of slivers. */
+/* Share of a mesh's triangles without area in the UVs: exporters make some of slivers. */
 static const double LARGEST_DEGENERATE = 0.01;
 
 int32_t vshi_receiver_unwrap(const vsh_receiver *receiver) {
@@ -84,37 +84,40 @@ vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mes
     return VSH_OK;
 }
 
-/* --- parts */
+/* --- meshes cut along their charts */
 
 typedef struct cutting {
-    const vsh_mesh *meshes;
-    size_t count;
-    const vsh_atlas_chart *charts;
-    size_t *on_page;  /* [page_count]: triangles of one mesh */
-    uint32_t objects; /* numbers of objects that are taken */
-    vshi_unwrapped *made;
+    const vshi_asset_place *place; /* of the whole meshes */
+    const vsh_atlas *atlas;
+    size_t page_count;
+    size_t *on_page;       /* [page_count]: triangles of one mesh */
+    size_t *next;          /* [page_count]: next part of each page */
+    uint32_t objects;      /* highest number of an object */
+    vsh_mesh *parts;       /* these three: [parts] */
+    size_t *numbers;       /* of the model's meshes */
+    size_t *atlas_numbers; /* of the atlas' meshes, which are the place's */
+    uint32_t *memory;      /* unused elements for positions, normals and indices */
 } cutting;
 
-/* The next `count` elements of four bytes in the memory for positions, normals and indices. */
-static void *take(vshi_unwrapped *made, size_t count) {
-    made->used += count;
-    return made->memory + made->used - count;
+static void *take_memory(cutting *c, size_t count) {
+    c->memory += count;
+    return c->memory - count;
 }
 
-static uint32_t page_of(const cutting *c, const vsh_atlas_mesh *view, size_t triangle) {
+static uint32_t find_page(const cutting *c, const vsh_atlas_mesh *view, size_t triangle) {
     const uint32_t chart = view->charts[triangle];
-    return chart == VSH_NO_CHART ? UINT32_MAX : c->charts[chart].page;
+    return chart == VSH_NO_CHART ? UINT32_MAX : vsh_atlas_charts(c->atlas)[chart].page;
 }
 
-/* Counts a mesh's triangles by pages; those without a chart go with the first that has any. Returns how many
- * pages there are. */
+/* Counts a mesh's triangles by pages. Triangles without a chart count on the first page with charts. Returns
+ * the number of pages. */
 static size_t count_by_page(const cutting *c, const vsh_atlas_mesh *view, size_t *first) {
-    size_t pages = 0, none = 0;
-    memset(c->on_page, 0, c->made->page_count * sizeof *c->on_page);
+    size_t pages = 0, without = 0;
+    memset(c->on_page, 0, c->page_count * sizeof *c->on_page);
     for (size_t t = 0; t < view->triangle_count; ++t) {
-        const uint32_t page = page_of(c, view, t);
+        const uint32_t page = find_page(c, view, t);
         if (page == UINT32_MAX) {
-            ++none;
+            ++without;
         } else {
             pages += c->on_page[page]++ == 0;
         }
@@ -122,16 +125,21 @@ static size_t count_by_page(const cutting *c, const vsh_atlas_mesh *view, size_t
     for (*first = 0; pages > 0 && c->on_page[*first] == 0;) {
         ++*first;
     }
-    c->on_page[*first] += none;
+    c->on_page[*first] += without;
     return pages > 0 ? pages : 1;
 }
 
-/* Copies three floats a vertex to where the atlas wants them; NULL where there are none. */
-static const float *gather(vshi_unwrapped *made, const float *from, const vsh_atlas_mesh *view) {
+/* Whether a mesh counted by pages has a part on the page. */
+static bool has_part(const cutting *c, size_t pages, size_t first, size_t page) {
+    return c->on_page[page] > 0 || (page == first && pages == 1);
+}
+
+/* Copies three floats a vertex in the atlas' order; NULL if there are none. */
+static const float *copy_vertices(cutting *c, const float *from, const vsh_atlas_mesh *view) {
     if (from == NULL || view->vertex_count == 0) {
         return NULL;
     }
-    float *to = take(made, 3 * (size_t)view->vertex_count);
+    float *to = take_memory(c, 3 * (size_t)view->vertex_count);
     for (size_t v = 0; v < view->vertex_count; ++v) {
         memcpy(to + 3 * v, from + 3 * (size_t)view->sources[v], 3 * sizeof *to);
     }
@@ -139,125 +147,132 @@ static const float *gather(vshi_unwrapped *made, const float *from, const vsh_at
 }
 
 /* Copies the triangles of a mesh that lie on one page. */
-static void select_page(const cutting *c, const vsh_atlas_mesh *view, uint32_t page, bool first,
-                        vsh_mesh *part) {
-    uint32_t *indices = take(c->made, 3 * c->on_page[page]);
+static void copy_triangles(cutting *c, const vsh_atlas_mesh *view, size_t page, bool first, vsh_mesh *part) {
+    uint32_t *indices = take_memory(c, 3 * c->on_page[page]);
     part->indices = indices;
     part->triangle_count = 0;
     for (size_t t = 0; t < view->triangle_count; ++t) {
-        const uint32_t own = page_of(c, view, t);
+        const uint32_t own = find_page(c, view, t);
         if (own == page || (own == UINT32_MAX && first)) {
             memcpy(indices + 3 * part->triangle_count++, view->indices + 3 * t, 3 * sizeof *indices);
         }
     }
 }
 
-/* Adds a mesh's parts to the pages' lists, of which `page_begins` says where each goes on. */
+/* Adds a mesh's parts to the pages. */
 static void add_parts(cutting *c, size_t m) {
-    vshi_unwrapped *made = c->made;
-    const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
+    const vsh_mesh *mesh = &c->place->meshes[m];
+    const vsh_atlas_mesh view = vsh_atlas_mesh_view(c->atlas, m);
     size_t first;
     const size_t pages = count_by_page(c, &view, &first);
-    vsh_mesh part = c->meshes[m];
+    vsh_mesh part = *mesh;
     part.checked = NULL;
     part.uvs = view.uvs;
     part.indices = view.indices;
     part.vertex_count = view.vertex_count;
     part.object = pages > 1 && part.object == 0 ? ++c->objects : part.object;
-    part.positions = gather(made, c->meshes[m].positions, &view);
-    part.normals = gather(made, c->meshes[m].normals, &view);
-    for (size_t page = 0; page < made->page_count; ++page) {
-        if (c->on_page[page] == 0 && !(page == first && pages == 1)) {
-            continue;
-        }
-        vsh_mesh *placed = &made->parts[made->page_begins[page]];
-        *placed = part;
-        made->numbers[made->page_begins[page]++] = m;
-        if (pages > 1) {
-            select_page(c, &view, (uint32_t)page, page == first, placed);
+    part.positions = copy_vertices(c, mesh->positions, &view);
+    part.normals = copy_vertices(c, mesh->normals, &view);
+    for (size_t page = 0; page < c->page_count; ++page) {
+        if (has_part(c, pages, first, page)) {
+            const size_t at = c->next[page]++;
+            c->parts[at] = part;
+            c->atlas_numbers[at] = m;
+            c->numbers[at] = c->place->numbers[m];
+            if (pages > 1) {
+                copy_triangles(c, &view, page, page == first, &c->parts[at]);
+            }
         }
     }
 }
 
-/* Finds where each page's parts begin, and how many there are. Returns the elements that they take. */
-static size_t count_parts(cutting *c) {
-    vshi_unwrapped *made = c->made;
+/* Finds where each page's parts begin. Returns the elements of memory that all parts take. */
+static size_t count_parts(cutting *c, size_t *begins) {
     size_t elements = 0;
-    for (size_t m = 0; m < c->count; ++m) {
-        const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
+    for (size_t m = 0; m < c->place->count; ++m) {
+        const vsh_mesh *mesh = &c->place->meshes[m];
+        const vsh_atlas_mesh view = vsh_atlas_mesh_view(c->atlas, m);
         size_t first;
         const size_t pages = count_by_page(c, &view, &first);
-        const bool empty = pages == 1 && c->on_page[first] == 0;
-        elements += (c->meshes[m].normals != NULL ? 6 : 3) * (size_t)view.vertex_count;
+        elements += (mesh->normals != NULL ? 6 : 3) * (size_t)view.vertex_count;
         elements += pages > 1 ? 3 * (size_t)view.triangle_count : 0;
-        for (size_t page = 0; page < made->page_count; ++page) {
-            made->page_begins[page + 1] += c->on_page[page] > 0 || (empty && page == first);
+        c->objects = mesh->object > c->objects ? mesh->object : c->objects;
+        for (size_t page = 0; page < c->page_count; ++page) {
+            begins[page + 1] += has_part(c, pages, first, page);
         }
     }
-    for (size_t page = 0; page < made->page_count; ++page) {
-        made->page_begins[page + 1] += made->page_begins[page];
+    for (size_t page = 0; page < c->page_count; ++page) {
+        begins[page + 1] += begins[page];
+        c->next[page] = begins[page];
     }
-    made->part_count = made->page_begins[made->page_count];
     return elements;
 }
 
-static vsh_result cut(cutting *c, const vsh_run *run, vsh_error *error) {
-    vshi_unwrapped *made = c->made;
-    double bytes = 0.0;
-    for (size_t m = 0; m < c->count; ++m) {
-        const vsh_atlas_mesh view = vsh_atlas_mesh_view(made->atlas, m);
-        const size_t width = c->meshes[m].normals != NULL ? 6 : 3;
-        bytes += (double)view.vertex_count * (double)(width * sizeof(float)) +
-                 (double)view.triangle_count * 3.0 * sizeof(uint32_t);
-        c->objects = c->meshes[m].object > c->objects ? c->meshes[m].object : c->objects;
+/* Replaces the place's meshes by their parts. */
+static vsh_result cut_meshes(vshi_asset_place *place, const vsh_run *run, vsh_error *error) {
+    vshi_receiver_pages *pages = &place->pages;
+    const size_t count = pages->count;
+    cutting c = {.place = place, .atlas = pages->atlas, .page_count = count};
+    const vshi_array lists[] = {VSHI_ARRAY(c.on_page, count), VSHI_ARRAY(c.next, count),
+                                VSHI_ARRAY(pages->begins, count + 1)};
+    vsh_result result;
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(lists, "pages", error));
+    const size_t elements = count_parts(&c, pages->begins), parts = pages->begins[count];
+    VSHI_TRY_DONE(vshi_check_limit(run, (double)elements * sizeof *c.memory, "unwrapped meshes", error));
+    const vshi_array arrays[] = {VSHI_ARRAY(c.parts, parts), VSHI_ARRAY(c.numbers, parts),
+                                 VSHI_ARRAY(pages->atlas_numbers, parts),
+                                 VSHI_ARRAY(pages->memory, elements)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "unwrapped meshes", error));
+    c.atlas_numbers = pages->atlas_numbers;
+    c.memory = pages->memory;
+    for (size_t m = 0; m < place->count; ++m) {
+        add_parts(&c, m);
     }
-    VSHI_TRY(vshi_check_limit(run, bytes, "unwrapped meshes", error));
-    made->page_count = vsh_atlas_page_count(made->atlas);
-    VSHI_TRY(vshi_allocate((void **)&c->on_page, made->page_count, sizeof *c->on_page, "pages", error));
-    VSHI_TRY(vshi_allocate((void **)&made->page_begins, made->page_count + 2, sizeof *made->page_begins,
-                           "pages", error));
-    const size_t elements = count_parts(c);
-    VSHI_TRY(vshi_allocate((void **)&made->parts, made->part_count, sizeof *made->parts, "meshes", error));
-    VSHI_TRY(
-        vshi_allocate((void **)&made->numbers, made->part_count, sizeof *made->numbers, "meshes", error));
-    VSHI_TRY(
-        vshi_allocate((void **)&made->memory, elements, sizeof *made->memory, "unwrapped meshes", error));
-    /* each page's beginning moves to its end, which is where the next one's is */
-    for (size_t m = 0; m < c->count; ++m) {
-        add_parts(c, m);
-    }
-    memmove(made->page_begins + 1, made->page_begins, made->page_count * sizeof *made->page_begins);
-    made->page_begins[0] = 0;
-    return VSH_OK;
+    free(place->numbers);
+    free(place->meshes);
+    place->numbers = c.numbers;
+    place->meshes = c.parts;
+    place->count = parts;
+    c.numbers = NULL;
+    c.parts = NULL;
+done:
+    free(c.numbers);
+    free(c.parts);
+    free(c.next);
+    free(c.on_page);
+    return result;
 }
+
+/* --- pages */
 
 /* Lists the pages of a receiver that is not unwrapped. */
-static vsh_result keep_pages(const vsh_receiver *receiver, const vsh_mesh *meshes, size_t count,
-                             vshi_unwrapped *unwrapped, vsh_error *error) {
-    unwrapped->whole = (vsh_receiver_page){receiver->width, receiver->height, NULL};
-    if (receiver->atlas != VSH_ATLAS_OBJECTS) {
-        return VSH_OK;
+static vsh_result keep_pages(vshi_asset_place *place, const vsh_receiver *receiver, vsh_error *error) {
+    vshi_receiver_pages *pages = &place->pages;
+    const bool objects = receiver->atlas == VSH_ATLAS_OBJECTS;
+    const vshi_array arrays[] = {VSHI_ARRAY(pages->begins, place->count + 1),
+                                 VSHI_ARRAY(pages->list, place->count)};
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "pages", error));
+    for (size_t first = 0, size; first < place->count; first += size) {
+        size = objects ? vshi_mesh_object_size(place->meshes, first, place->count) : place->count;
+        pages->list[pages->count] = (vshi_receiver_page){
+            receiver->width, receiver->height, objects ? vshi_object_name(&place->meshes[first]) : NULL};
+        pages->begins[++pages->count] = first + size;
     }
-    VSHI_TRY(vshi_allocate((void **)&unwrapped->page_begins, count + 1, sizeof *unwrapped->page_begins,
-                           "pages", error));
-    VSHI_TRY(vshi_allocate((void **)&unwrapped->pages, count, sizeof *unwrapped->pages, "pages", error));
-    for (size_t first = 0; first < count; first += vshi_mesh_object_size(meshes, first, count)) {
-        unwrapped->pages[unwrapped->page_count] = unwrapped->whole;
-        unwrapped->pages[unwrapped->page_count].object = vshi_object_name(&meshes[first]);
-        unwrapped->page_begins[unwrapped->page_count++] = first;
-    }
-    unwrapped->page_begins[unwrapped->page_count] = count;
     return VSH_OK;
 }
 
-static vsh_result list_pages(const vsh_receiver *receiver, const vsh_mesh *meshes, vshi_unwrapped *made,
-                             vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&made->pages, made->page_count, sizeof *made->pages, "pages", error));
-    for (size_t i = 0; i < made->page_count; ++i) {
-        const vsh_atlas_page page = vsh_atlas_page_view(made->atlas, i);
-        const bool own = receiver->atlas == VSH_ATLAS_OBJECTS;
-        made->pages[i] = (vsh_receiver_page){page.width, page.height,
-                                             own ? vshi_object_name(&meshes[page.first_mesh]) : NULL};
+/* Lists the pages of an atlas of the place's meshes. */
+static vsh_result list_pages(vshi_asset_place *place, const vsh_receiver *receiver, vsh_error *error) {
+    vshi_receiver_pages *pages = &place->pages;
+    const bool objects = receiver->atlas == VSH_ATLAS_OBJECTS;
+    vsh_atlas_info info;
+    vsh_atlas_get_info(pages->atlas, &info);
+    pages->count = info.pages;
+    VSHI_TRY(vshi_allocate((void **)&pages->list, pages->count, sizeof *pages->list, "pages", error));
+    for (size_t i = 0; i < pages->count; ++i) {
+        const vsh_atlas_page page = vsh_atlas_page_view(pages->atlas, i);
+        pages->list[i] = (vshi_receiver_page){
+            page.width, page.height, objects ? vshi_object_name(&place->meshes[page.first_mesh]) : NULL};
     }
     return VSH_OK;
 }
@@ -290,8 +305,7 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
     return VSH_OK;
 }
 
-/* Lists the factors of the density of a receiver's meshes, to be freed also after an error; NULL: all are 1.
- */
+/* Lists the density factors of a receiver's meshes, to be freed also after an error; NULL: all are 1. */
 static vsh_result list_densities(const vsh_receiver *receiver, const vshi_asset_place *place,
                                  double **density, vsh_error *error) {
     if (receiver->density_count == 0) {
@@ -307,67 +321,48 @@ static vsh_result list_densities(const vsh_receiver *receiver, const vshi_asset_
     return VSH_OK;
 }
 
-/* Puts the parts, and what their meshes are numbered, in the place of the meshes. */
-static vsh_result take_parts(vshi_asset_place *place, vsh_error *error) {
-    vshi_unwrapped *made = &place->unwrapped;
-    size_t *numbers = NULL;
-    VSHI_TRY(vshi_allocate((void **)&numbers, made->part_count, sizeof *numbers, "meshes", error));
-    for (size_t i = 0; i < made->part_count; ++i) {
-        numbers[i] = place->numbers[made->numbers[i]];
-    }
-    free(place->numbers);
-    free(place->meshes);
-    place->numbers = numbers;
-    place->meshes = made->parts;
-    place->count = made->part_count;
-    made->parts = NULL;
-    return VSH_OK;
+static vsh_unwrap_options choose_unwrap_options(const vsh_receiver *receiver) {
+    vsh_unwrap_options options = vsh_unwrap_options_default();
+    const bool fit = receiver->max_size > 0, dense = receiver->texels_per_unit > 0.0;
+    options.width = fit ? receiver->max_size : receiver->width;
+    options.height = fit ? receiver->max_size : receiver->height;
+    options.fit_pages = fit;
+    options.atlas = receiver->atlas;
+    options.padding = receiver->padding == VSH_PADDING_AUTO ? options.padding : receiver->padding;
+    options.texels_per_unit = receiver->texels_per_unit;
+    options.max_pages = receiver->pages > 0                            ? receiver->pages
+                        : dense && receiver->atlas == VSH_ATLAS_SHARED ? VSH_MAX_PAGES
+                                                                       : 1;
+    options.keep_uvs =
+        vshi_receiver_unwrap(receiver) == VSH_RECEIVER_UNWRAP_ALWAYS ? VSH_UNWRAP_ALWAYS : VSH_UNWRAP_KEEP;
+    return options;
 }
 
 static vsh_result unwrap(vshi_asset_place *place, const vsh_receiver *receiver, const vsh_run *run,
                          vsh_error *error) {
-    vshi_unwrapped *made = &place->unwrapped;
-    vsh_unwrap_options options = vsh_unwrap_options_default();
-    options.width = receiver->max_size > 0 ? receiver->max_size : receiver->width;
-    options.height = receiver->max_size > 0 ? receiver->max_size : receiver->height;
-    options.fit_pages = receiver->max_size > 0;
-    options.atlas = receiver->atlas;
-    options.padding =
-        receiver->padding == VSH_PADDING_AUTO ? vsh_unwrap_options_default().padding : receiver->padding;
-    options.texels_per_unit = receiver->texels_per_unit;
-    options.max_pages = receiver->pages > 0 ? receiver->pages
-                        : receiver->texels_per_unit > 0.0 && receiver->atlas == VSH_ATLAS_SHARED
-                            ? VSH_MAX_PAGES
-                            : 1;
-    options.keep_uvs =
-        vshi_receiver_unwrap(receiver) == VSH_RECEIVER_UNWRAP_ALWAYS ? VSH_UNWRAP_ALWAYS : VSH_UNWRAP_KEEP;
+    vsh_unwrap_options options = choose_unwrap_options(receiver);
     if (receiver->max_size > 0 && receiver->texels_per_unit == 0.0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: a largest size (max_size) is for a density (texels_per_unit): without one, any "
+                         "%s: a largest size (max_size) needs a density (texels_per_unit): without one, any "
                          "size is filled",
                          receiver->path);
     }
     if (receiver->pages > 1 && receiver->atlas == VSH_ATLAS_OBJECTS) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d pages: of an atlas of objects each has one",
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %d pages: in an atlas of objects each has one",
                          receiver->path, receiver->pages);
     }
-    cutting c = {.meshes = place->meshes, .count = place->count, .made = made};
     vsh_error why;
     double *density = NULL;
     vsh_result result = list_densities(receiver, place, &density, error);
     if (result == VSH_OK) {
         options.density = density;
-        result = vsh_unwrap(place->meshes, place->count, &options, run, &made->atlas, &why);
+        result = vsh_unwrap(place->meshes, place->count, &options, run, &place->pages.atlas, &why);
         result = result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", receiver->path, why.message);
     }
     free(density);
     VSHI_TRY(result);
-    c.charts = vsh_atlas_charts(made->atlas);
-    result = cut(&c, run, error);
-    free(c.on_page);
-    VSHI_TRY(result);
-    VSHI_TRY(list_pages(receiver, place->meshes, made, error));
-    return take_parts(place, error);
+    VSHI_TRY(list_pages(place, receiver, error));
+    return cut_meshes(place, run, error);
 }
 
 /* Whether a lit asset's own UVs are a packer's integers. Few engines read a lightmap with those. */
@@ -388,17 +383,14 @@ vsh_result vshi_place_pages(vshi_asset_place *place, const vsh_receiver *receive
                             vsh_error *error) {
     int32_t needs = 0;
     VSHI_TRY(vsh_receiver_needs_unwrap(receiver, place->meshes, place->count, run, &needs, error));
-    return needs != 0 || is_packed(place, receiver)
-               ? unwrap(place, receiver, run, error)
-               : keep_pages(receiver, place->meshes, place->count, &place->unwrapped, error);
+    return needs != 0 || is_packed(place, receiver) ? unwrap(place, receiver, run, error)
+                                                    : keep_pages(place, receiver, error);
 }
 
-void vshi_unwrapped_free(vshi_unwrapped *unwrapped) {
-    free(unwrapped->memory);
-    free(unwrapped->pages);
-    free(unwrapped->page_begins);
-    free(unwrapped->numbers);
-    free(unwrapped->parts);
-    vsh_atlas_free(unwrapped->atlas);
-    *unwrapped = (vshi_unwrapped){0};
+void vshi_receiver_pages_free(vshi_receiver_pages *pages) {
+    free(pages->memory);
+    free(pages->list);
+    free(pages->begins);
+    free(pages->atlas_numbers);
+    vsh_atlas_free(pages->atlas);
 }

@@ -1,9 +1,9 @@
 /* Procedural signed distance fields: the check of a tree, its distance and its box.
  *
- * Shapes: I. Quilez, "distance functions" (2008 …) and "exact SDF of a capped cone" (2018); all of them are
+ * Shapes are after I. Quilez, "distance functions" (2008 …) and "exact SDF of a capped cone" (2018). All are
  * true distances, inside too. min, max(a, b) and max(a, -b) change no faster than their operands, so every
- * tree changes by at most 1 per unit; so does the quadratic smooth minimum ("smooth minimum", 2013), whose
- * gradient is a mean of its operands'. */
+ * tree changes by at most 1 per unit. The gradient of the quadratic smooth minimum ("smooth minimum", 2013)
+ * is a mean of its operands'. */
 #include "sdf/sdf.h"
 
 #include "base/error.h"
@@ -15,14 +15,14 @@
 
 enum { MAX_NODES = 65536 };
 
-/* The operands of an operation that decide. */
+/* The deciding operands of an operation. */
 enum { KEEP_BOTH, KEEP_LEFT, KEEP_RIGHT };
 
 static inline bool is_operation(const vsh_sdf_node *node) {
     return node->shape >= VSH_SDF_UNION;
 }
 
-/* v turned by the quaternion, or back. Shapes are mostly not turned at all, and that is free. */
+/* Turns v by the quaternion (`direction` 1), or back (-1). Most shapes are not turned, and cost nothing. */
 static inline vshi_vec rotate(const double q[4], double direction, vshi_vec v) {
     if (q[0] == 0.0 && q[1] == 0.0 && q[2] == 0.0) {
         return v;
@@ -33,8 +33,8 @@ static inline vshi_vec rotate(const double q[4], double direction, vshi_vec v) {
     return vshi_add(vshi_add(v, vshi_scale(twice, q[3] * scale)), vshi_cross(axis, twice));
 }
 
-/* max, min and clamp as comparisons: fmin and fmax are calls where NaN must be minded, and these run for
- * every voxel; a NaN position still gives NaN through the lengths. */
+/* Comparisons run for every voxel, so they are no calls of fmin() and fmax(), which handle NaN. A NaN
+ * position still gives NaN through the lengths. */
 static inline double larger(double a, double b) {
     return a > b ? a : b;
 }
@@ -120,7 +120,7 @@ static inline vshi_vec to_node(const vsh_sdf_node *node, vshi_vec p) {
     return node->scale != 1.0 ? vshi_scale(p, 1.0 / node->scale) : p;
 }
 
-/* Which fields a shape reads, in the order of vsh_sdf_node. */
+/* Fields that a shape reads, in the order of vsh_sdf_node. */
 enum {
     SIZE_X = 1,
     SIZE_Y = 2,
@@ -199,7 +199,7 @@ static vsh_result check_placement(const vsh_sdf_node *node, size_t index, vsh_er
     return VSH_OK;
 }
 
-/* Checks the operands of node `index`, and notes its depth; a depth of 0 marks a node that is used. */
+/* Checks the operands of node `index`, and sets its depth. A depth of 0 marks a used node. */
 static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *depth, vsh_error *error) {
     const vsh_sdf_node *node = &sdf->nodes[index];
     if (!is_operation(node)) {
@@ -231,7 +231,7 @@ static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *dept
     return VSH_OK;
 }
 
-/* `depth`: one of 0 for each node. */
+/* depth[node_count] is all 0. */
 static vsh_result check_tree(const vsh_sdf *sdf, int32_t *depth, vsh_error *error) {
     for (size_t i = 0; i < sdf->node_count; ++i) {
         const vsh_sdf_node *node = &sdf->nodes[i];
@@ -252,13 +252,13 @@ static vsh_result check_tree(const vsh_sdf *sdf, int32_t *depth, vsh_error *erro
         }
     }
     double low[3], high[3];
-    vsh_sdf_bounds(sdf, low, high);
+    vshi_sdf_bounds(sdf, low, high);
     return vshi_finite(vshi_vec_of(low)) && vshi_finite(vshi_vec_of(high))
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_INPUT, "sdf: its box is not finite: sizes too large");
 }
 
-vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
+vsh_result vshi_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(sdf);
     if (sdf->nodes == NULL || sdf->node_count < 1 || sdf->node_count > MAX_NODES) {
@@ -272,7 +272,7 @@ vsh_result vsh_sdf_check(const vsh_sdf *sdf, vsh_error *error) {
     return result;
 }
 
-/* `keep`: which operands decide; NULL: both. */
+/* `keep`: the deciding operands; NULL: both. */
 static double node_distance(const vsh_sdf_node *nodes, const uint8_t *keep, int32_t index, vshi_vec p) {
     const vsh_sdf_node *node = &nodes[index];
     const int kept = keep != NULL ? keep[index] : KEEP_BOTH;
@@ -305,22 +305,22 @@ void vshi_sdf_distances_within(const vsh_sdf *sdf, const uint8_t *keep, size_t c
     }
 }
 
-double vsh_sdf_distance(const vsh_sdf *sdf, const double position[3]) {
+double vshi_sdf_distance(const vsh_sdf *sdf, const double position[3]) {
     VSHI_FLOATS;
     return vshi_sdf_distance_at(sdf, vshi_vec_of(position));
 }
 
-/* A distance, and how far rounding may have moved it. */
+/* A distance, and the largest error by rounding. */
 typedef struct rounded {
     double distance, error;
 } rounded;
 
-/* `radius` in the units of the node's parent. Where operands differ by more than both can change within the
- * radius, and by what rounding may do, the same one decides all over: a tree is narrowed to the shapes that
- * matter in a box (T. Duff, "Interval arithmetic and recursive subdivision for implicit functions", 1992). */
+/* Narrows a tree to the shapes that decide within `radius`, in the units of the node's parent (T. Duff,
+ * "Interval arithmetic and recursive subdivision for implicit functions", 1992). If operands differ by more
+ * than both can change within the radius, rounding included, the same one decides everywhere. */
 static rounded narrow(const vsh_sdf_node *nodes, int32_t index, vshi_vec p, double radius, uint8_t *keep) {
-    const double ROUNDED = 1e-12; /* of the lengths that meet: a few thousand times what doubles are off */
-    const double LARGEST = 1e100; /* whose squares are far from overflow */
+    const double ROUNDED = 1e-12; /* share of the lengths: a few thousand times a double's rounding */
+    const double LARGEST = 1e100; /* its square is far from overflow */
     const vsh_sdf_node *node = &nodes[index];
     const double lengths = vshi_length(p) + vshi_length(vshi_vec_of(node->translation));
     p = to_node(node, p);
@@ -335,7 +335,7 @@ static rounded narrow(const vsh_sdf_node *nodes, int32_t index, vshi_vec p, doub
         const rounded left = narrow(nodes, node->left, p, radius, keep);
         const rounded right = narrow(nodes, node->right, p, radius, keep);
         here = (rounded){combine(node, left.distance, right.distance), left.error + right.error};
-        /* how much more the left one counts than the right one */
+        /* positive: the left operand decides */
         const double more = node->shape == VSH_SDF_UNION          ? right.distance - left.distance
                             : node->shape == VSH_SDF_INTERSECTION ? left.distance - right.distance
                             : node->shape == VSH_SDF_SUBTRACTION  ? left.distance + right.distance
@@ -363,8 +363,8 @@ bool vshi_sdf_exact(const vsh_sdf *sdf) {
     return true;
 }
 
-/* Where a node stands in the world: x → scale · (x · axis[0], x · axis[1], x · axis[2]) + origin, with the
- * axes being the rows of a rotation. */
+/* A node's place in the world: x → scale · (x · axis[0], x · axis[1], x · axis[2]) + origin. The axes are the
+ * rows of a rotation. */
 typedef struct placement {
     vshi_vec axis[3];
     vshi_vec origin;
@@ -387,7 +387,7 @@ static placement place_node(const placement *parent, const vsh_sdf_node *node) {
     return at;
 }
 
-/* How far a shape reaches along a unit direction: its support function. */
+/* The support function of a shape: its extent along a unit direction. */
 static double shape_extent(const vsh_sdf_node *node, vshi_vec along) {
     const double across = sqrt(along.x * along.x + along.z * along.z);
     switch (node->shape) {
@@ -434,7 +434,7 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
     for (int i = 0; i < 3; ++i) {
         if (node->shape == VSH_SDF_INTERSECTION) {
             low[i] = larger(low[i], low2[i]);
-            high[i] = larger(low[i], smaller(high[i], high2[i])); /* nothing in common: flat, not inverted */
+            high[i] = larger(low[i], smaller(high[i], high2[i])); /* disjoint boxes: flat, not inverted */
         } else {
             low[i] = smaller(low[i], low2[i]) - grown;
             high[i] = larger(high[i], high2[i]) + grown;
@@ -442,7 +442,7 @@ static void node_bounds(const vsh_sdf_node *nodes, int32_t index, const placemen
     }
 }
 
-void vsh_sdf_bounds(const vsh_sdf *sdf, double bounds_min[3], double bounds_max[3]) {
+void vshi_sdf_bounds(const vsh_sdf *sdf, double bounds_min[3], double bounds_max[3]) {
     VSHI_FLOATS;
     const placement world = {{{1.0, 0.0, 0.0}, {0.0, 1.0, 0.0}, {0.0, 0.0, 1.0}}, {0.0, 0.0, 0.0}, 1.0};
     node_bounds(sdf->nodes, (int32_t)sdf->node_count - 1, &world, bounds_min, bounds_max);

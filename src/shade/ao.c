@@ -1,10 +1,12 @@
-/* Ambient occlusion: options, and which method shades the points. */
+/* Ambient occlusion: checks, the method of taps, and the calls for points. */
 #include "shade/ao.h"
 #include "base/floats.h"
+#include "base/memory.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 vshi_vec vshi_ao_face(const vshi_ao_task *task, size_t i, vshi_vec normal) {
     if (task->faces == NULL) {
@@ -29,11 +31,11 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
         return vshi_finite(frame->origin);
     }
     vshi_vec normal;
-    if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, task->options),
+    if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, &task->options),
                            &frame->origin, &normal)) {
         task->ao[i] = NAN;
         if (task->bent != NULL) {
-            vshi_ao_set_bent(task, i, (vshi_vec){NAN, NAN, NAN});
+            vshi_vec_to_floats((vshi_vec){NAN, NAN, NAN}, task->bent + 3 * i);
         }
         ++stats->invalid;
         return false;
@@ -43,11 +45,11 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
     return true;
 }
 
-/* Ambient occlusion by five samples along the normal: what the surface comes nearer than an open plane would
- * (Quilez). Tuned by eye; too dark in corners. */
+/* Shades by five samples along the normal: how much nearer the surface is than an open plane (Quilez). Tuned
+ * by eye; too dark in corners. */
 static void shade_by_taps(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_ao_task *task = user;
-    /* his scene's distances 0.01 … 0.13 stand for the AO distance */
+    /* his distances 0.01 … 0.13, scaled to the AO distance */
     static const double FIRST = 0.01, LAST = 0.13, FADE = 0.95, STRENGTH = 3.0;
     const double unit = task->distance / LAST;
     const double reach = (double)task->field->levels[task->field->level_count - 1].band;
@@ -60,10 +62,8 @@ static void shade_by_taps(const void *user, size_t begin, size_t end, vsh_shade_
         for (int tap = 0; tap < 5; ++tap) {
             const double h = FIRST + (LAST - FIRST) * tap / 4.0;
             const vshi_vec p = vshi_add(frame.origin, vshi_scale(frame.axes[2], h * unit));
-            const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
-            /* beyond the coarsest band only the band is known: a bound from below, which tells of no occluder
-             */
-            const double distance = (double)vshi_field_distance(task->field, at);
+            /* beyond the coarsest band the distance is only a lower bound, and shows no occluder */
+            const double distance = vshi_distance_at(task->field, p);
             const bool beyond = distance >= reach && h * unit > reach;
             stats->beyond_reach += beyond;
             occlusion += beyond ? 0.0 : weight * (h - fmin(h, distance / unit));
@@ -77,7 +77,7 @@ static void shade_by_taps(const void *user, size_t begin, size_t end, vsh_shade_
 
 void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_ao_task *task = user;
-    const int32_t method = task->options->ao_method;
+    const int32_t method = task->options.ao_method;
     vshi_shade_fn *shade = method == VSH_AO_TAPS    ? shade_by_taps
                            : method == VSH_AO_CONES ? vshi_ao_by_cones
                                                     : vshi_ao_by_rays;
@@ -93,13 +93,12 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
     }
 }
 
-/* Of the casters' size, diagonally, what they are taken to be large: a well two wide and one deep is an
- * eighth, and what is seen of the sky from its floor came out darker by 0.01 with lattices as wide as the AO
- * distance allows. */
+/* Share of the casters' diagonal that limits the scale. A well two wide and one deep is an eighth: with
+ * lattices as wide as the AO distance allows, its floor came out darker by 0.01. */
 static const double PART = 0.125;
 
-/* Sides of the casters' box, world units. */
-static vshi_vec sides_of(const vsh_occluders *occluders) {
+/* The length over which AO bends, world units: the AO distance, or a part of the casters if that is less. */
+static double scale_of(const vsh_occluders *occluders, double ao_distance) {
     const vsh_field *f = occluders->field;
     double low[3], high[3], side[3];
     if (occluders->triangles != NULL) {
@@ -110,53 +109,46 @@ static vshi_vec sides_of(const vsh_occluders *occluders) {
                          ? high[axis] - low[axis]
                          : f->voxel_size * ((double)f->bounds_max[axis] - (double)f->bounds_min[axis]);
     }
-    return vshi_vec_of(side);
-}
-
-/* Over what lengths AO bends, world units: the AO distance, beyond which nothing hides, or where that is
- * large or has no end, a part of the casters. */
-static double scale_of(const vsh_occluders *occluders, double ao_distance) {
-    const vshi_vec sides = sides_of(occluders);
-    return fmin(ao_distance, PART * sqrt(vshi_dot(sides, sides)));
+    return fmin(ao_distance, PART * vshi_length(vshi_vec_of(side)));
 }
 
 vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options, bool sphere,
-                           vshi_ao_cones *cones, vshi_ao_task *task, vsh_error *error) {
-    if (options->ao_method == VSH_AO_EXACT && occluders->triangles == NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "AO method exact: the occluders have no triangles, which it traces");
-    }
-    if (options->ao_method != VSH_AO_EXACT && occluders->field->unknown) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "AO method %s: the occluders have no voxels, which it marches; exact needs none",
-                         vsh_get_name(VSH_NAMES_AO, options->ao_method));
-    }
+                           vshi_ao_task *task, vsh_error *error) {
     const vshi_vec up = vshi_vec_of(options->ao_up);
     const bool horizon = vshi_dot(up, up) > 0.0;
-    if (horizon && !vshi_ao_has_rays(options)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "AO over a horizon: method %s knows none; rays, adaptive and exact do",
-                         vsh_get_name(VSH_NAMES_AO, options->ao_method));
-    }
-    if (options->ao_method == VSH_AO_CONES) {
-        vshi_ao_cones_place(cones, options->ao_cones, sphere);
-    }
     *task = (vshi_ao_task){.field = occluders->field,
                            .triangles = occluders->triangles,
-                           .options = options,
-                           .cones = cones,
+                           .options = *options,
                            .sphere = sphere,
                            .up = horizon ? vshi_unit(up) : up,
                            .distance = options->ao_distance / occluders->field->voxel_size,
                            .scale = scale_of(occluders, options->ao_distance)};
-    return VSH_OK;
-}
-
-vsh_result vshi_ao_check_points(const vsh_points *points, vsh_error *error) {
-    if (points->normals == NULL && points->count > 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
+    const vsh_shade_options *full = &task->options;
+    vshi_shade_options_settle(&task->options, occluders->triangles);
+    if (full->ao_method == VSH_AO_EXACT && occluders->triangles == NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO method exact: the occluders have no triangles, which it traces");
     }
-    return VSH_OK;
+    if (full->ao_method != VSH_AO_EXACT && occluders->field->unknown) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO method %s: the occluders have no voxels, which it marches; exact needs none",
+                         vsh_get_name(VSH_NAMES_AO, full->ao_method));
+    }
+    if (horizon && !vshi_ao_has_rays(full)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "AO over a horizon: method %s knows none; rays, adaptive and exact do",
+                         vsh_get_name(VSH_NAMES_AO, full->ao_method));
+    }
+    if (full->ao_method == VSH_AO_CONES) {
+        VSHI_TRY(vshi_allocate((void **)&task->cones, 1, sizeof *task->cones, "AO", error));
+        vshi_ao_cones_place(task->cones, full->ao_cones, sphere);
+    }
+    if (!vshi_ao_has_rays(full)) {
+        return VSH_OK;
+    }
+    task->sampler = vshi_sampler_create(full->sampler, vshi_ao_most_rays(full), full->frame);
+    return task->sampler != NULL ? VSH_OK
+                                 : vshi_fail(error, VSH_ERROR_MEMORY, "AO: the system refused memory");
 }
 
 void vshi_ao_bent(float *bent, const float *normal) {
@@ -165,15 +157,13 @@ void vshi_ao_bent(float *bent, const float *normal) {
         return;
     }
     const vshi_vec b = vshi_dot(d, n) > 0.0 ? vshi_unit(d) : n;
-    bent[0] = (float)b.x;
-    bent[1] = (float)b.y;
-    bent[2] = (float)b.z;
+    vshi_vec_to_floats(b, bent);
 }
 
-void vshi_ao_close(vshi_ao_shader *shader) {
-    vshi_sampler_free(shader->sampler);
-    vshi_layers_free(shader->layers);
-    *shader = (vshi_ao_shader){.sampler = NULL};
+void vshi_ao_close(vshi_ao_task *task) {
+    free(task->cones);
+    vshi_sampler_free(task->sampler);
+    vshi_layers_free(task->layers);
 }
 
 static vsh_result check_shading(const vsh_shade_options *options, vshi_ao_shading shading, vsh_error *error) {
@@ -189,47 +179,32 @@ static vsh_result check_shading(const vsh_shade_options *options, vshi_ao_shadin
 }
 
 vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options *options,
-                        vshi_ao_shading shading, int32_t isa, vshi_ao_shader *shader, vsh_error *error) {
-    *shader = (vshi_ao_shader){.sampler = NULL};
-    vsh_shade_options *full = &shader->options;
-    VSHI_TRY(vshi_shade_options_resolve(options, full, error));
-    VSHI_TRY(check_shading(full, shading, error));
-    VSHI_TRY(vshi_layers_prepare(occluders, full, NULL, shading.sphere, &shader->layers, error));
-    vshi_shade_options_settle(full, occluders->triangles);
+                        vshi_ao_shading shading, int32_t isa, vshi_ao_task *task, vsh_error *error) {
+    vsh_shade_options full;
+    vshi_layers *layers;
+    *task = (vshi_ao_task){.sampler = NULL};
+    VSHI_TRY(vshi_shade_options_resolve(options, &full, error));
+    VSHI_TRY(check_shading(&full, shading, error));
+    VSHI_TRY(vshi_layers_prepare(occluders, &full, NULL, shading.sphere, &layers, error));
     if (shading.shared) {
-        full->sampler = vshi_ao_tile_sampler(full->sampler);
+        full.sampler = vshi_ao_tile_sampler(full.sampler);
     }
-    VSHI_TRY(vshi_ao_prepare(occluders, full, shading.sphere, &shader->cones, &shader->task, error));
-    if (vshi_ao_has_rays(full)) {
-        VSHI_TRY(vshi_shade_sampler(full, vshi_ao_most_rays(full), "ao", &shader->sampler, error));
-    }
-    shader->task.layers = shading.shared ? NULL : shader->layers; /* with layers nothing is shared */
-    shader->task.sampler = shader->sampler;
-    shader->task.kernel = vshi_kernel_of(isa);
-    shader->task.outside = shading.outside;
-    return VSH_OK;
+    const vsh_result result = vshi_ao_prepare(occluders, &full, shading.sphere, task, error);
+    task->layers = layers;
+    task->kernel = vshi_kernel_of(isa);
+    task->outside = shading.outside;
+    return result;
 }
 
-void vshi_ao_points(const vshi_ao_shader *shader, const vsh_points *points, const float *faces, float *ao,
+void vshi_ao_points(const vshi_ao_task *prepared, const vsh_points *points, const float *faces, float *ao,
                     float *deviation, float *bent, vsh_shade_stats *stats) {
-    vshi_ao_task task = shader->task;
+    vshi_ao_task task = *prepared;
     task.points = points;
     task.faces = faces;
     task.ao = ao;
     task.deviation = deviation;
     task.bent = bent;
     vshi_ao_shade(&task, 0, points->count, stats);
-}
-
-void vshi_ao_shoot(const vshi_ao_shader *shader, const vsh_points *points, const float *faces,
-                   const vshi_ao_share *share, float *shot, float *open, vsh_shade_stats *stats) {
-    vshi_ao_task task = shader->task;
-    task.points = points;
-    task.faces = faces;
-    task.ao = shot;
-    task.bent = open;
-    task.share = share;
-    vshi_ao_by_squares(&task, 0, vshi_ao_squares(share), stats);
 }
 
 vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
@@ -242,22 +217,23 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
     VSHI_NEEDS_OF(points->count, ao);
     vsh_run full_run;
     VSHI_TRY(vshi_run_resolve(run, &full_run, error));
-    VSHI_TRY(vshi_ao_check_points(points, error));
-    vshi_ao_shader shader;
+    if (points->normals == NULL && points->count > 0) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
+    }
+    vshi_ao_task task;
     vsh_result result;
     VSHI_TRY_DONE(vshi_ao_open(occluders, options, (vshi_ao_shading){.bent = bent != NULL}, full_run.isa,
-                               &shader, error));
-    shader.task.points = points;
-    shader.task.ao = ao;
-    shader.task.deviation = deviation;
-    shader.task.bent = bent;
-    const size_t grain = shader.options.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
-    VSHI_TRY_DONE(
-        vshi_shade_run(&full_run, "ao", points->count, grain, vshi_ao_shade, &shader.task, stats, error));
+                               &task, error));
+    task.points = points;
+    task.ao = ao;
+    task.deviation = deviation;
+    task.bent = bent;
+    const size_t grain = task.options.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
+    VSHI_TRY_DONE(vshi_shade_run(&full_run, "ao", points->count, grain, vshi_ao_shade, &task, stats, error));
     for (size_t i = 0; bent != NULL && i < points->count; ++i) {
         vshi_ao_bent(bent + 3 * i, points->normals + 3 * i);
     }
 done:
-    vshi_ao_close(&shader);
+    vshi_ao_close(&task);
     return result;
 }

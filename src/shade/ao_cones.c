@@ -1,21 +1,31 @@
 /* Ambient occlusion by cones over the hemisphere, each an equal share of the cosine-weighted sky.
  *
- * What a cone sees is taken from how near it comes to the casters, and from how free the cones beside it are.
- * Its own closeness alone cannot tell: what is thinner than the cone is wide reads as an edge through it
- * wherever it is, so closed rooms of thin walls were half lit. Beside an edge some cones are free, within a
- * room none. The table holds the mean of what cones of such evidence saw, by analytic rays, on scenes
- * of boxes, slats, spheres and rooms: bench/fit_ao.c makes and prints it. */
+ * The visible share of a cone depends on how near the casters come to it, and on how free its neighbours are.
+ * Its own closeness is not enough: casters thinner than the cone read as an edge through it, so closed rooms
+ * with thin walls were half lit. Next to an edge some cones are free, but not in a room. The table holds mean
+ * shares by analytic rays, on scenes of boxes, slats, spheres and rooms. bench/fit_ao.c computes and prints
+ * it. */
 #include "base/elementary.h"
 #include "shade/ao.h"
 
 #include <math.h>
 #include <string.h>
 
-/* Half angles over those of equal shares of the solid angle. */
+/* Half angles, as a share of the half angles of equal solid angles. */
 static const double WIDTH = 0.7;
 
+/* Mean visible share of a cone: rows by its closeness over its sine, -1 … 1, columns by how free its
+ * neighbours are, 0 … 1. Printed by bench/fit_ao.c. */
 static const float TABLE[VSHI_AO_TABLE_EDGE][VSHI_AO_TABLE_EDGE] = {
-#include "shade/ao_table.inc"
+    {0.0000f, 0.0000f, 0.0000f, 0.0000f, 0.0000f, 0.0000f, 0.0000f, 0.0000f, 0.0000f},
+    {0.0000f, 0.1017f, 0.1017f, 0.1220f, 0.1526f, 0.1526f, 0.1614f, 0.2035f, 0.5186f},
+    {0.0000f, 0.1080f, 0.1080f, 0.2362f, 0.2700f, 0.2700f, 0.2744f, 0.2744f, 0.5186f},
+    {0.0000f, 0.1080f, 0.1080f, 0.2362f, 0.2784f, 0.2910f, 0.3476f, 0.3476f, 0.5633f},
+    {0.0000f, 0.3478f, 0.3478f, 0.4453f, 0.5097f, 0.5174f, 0.5588f, 0.5801f, 0.7020f},
+    {0.6620f, 0.6620f, 0.6685f, 0.6735f, 0.6735f, 0.7353f, 0.7353f, 0.7353f, 0.7907f},
+    {0.7500f, 0.7500f, 0.7500f, 0.7696f, 0.7750f, 0.7750f, 0.7750f, 0.7750f, 0.8432f},
+    {0.7500f, 0.7500f, 0.8035f, 0.8166f, 0.8271f, 0.8271f, 0.8387f, 0.8387f, 0.8562f},
+    {1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f, 1.0000f},
 };
 
 static void find_neighbours(vshi_ao_cones *cones) {
@@ -43,8 +53,8 @@ static void find_neighbours(vshi_ao_cones *cones) {
 static const double GOLDEN_ANGLE = 2.39996322972865332, WIDEST = 0.95;
 
 /* Directions of equal weight: a golden-angle spiral over the disc, lifted to the hemisphere (Malley's
- * method), or over the sphere. No cone over the hemisphere dips below the receiver's plane, which is the
- * receiver's own and hides nothing of what is counted. */
+ * method), or over the sphere. No cone over the hemisphere dips below the receiver's plane, which hides only
+ * directions that do not count. */
 void vshi_ao_cones_place(vshi_ao_cones *cones, int32_t count, bool sphere) {
     cones->count = count;
     const double cosine = sphere ? fmax(0.0, 1.0 - 2.0 / count) : 1.0 - 1.0 / count;
@@ -82,7 +92,7 @@ int32_t vshi_ao_table_cell(const double evidence[2], double part[2]) {
     return r * VSHI_AO_TABLE_EDGE + c;
 }
 
-/* What cone c of a point sees. Free and hidden cones are so whatever is beside them. */
+/* Visible share of cone c of a point. Free and hidden cones do not depend on their neighbours. */
 static double cone_share(const vshi_ao_cones *cones, const float *close, int32_t c) {
     const double closeness = (double)close[c], sine = (double)(float)cones->sines[c];
     if (closeness >= sine) {
@@ -100,8 +110,8 @@ static double cone_share(const vshi_ao_cones *cones, const float *close, int32_t
     return near + (far - near) * part[0];
 }
 
-/* The open share of the cones above a point's face. Sets *where to the mean open direction, along the frame's
- * axes as `face` is. */
+/* The open share of the cones above a point's face, and the mean open direction, both along the frame's axes.
+ */
 static double open_share(const vshi_ao_cones *cones, const float *close, vshi_vec face, vshi_vec *where) {
     int32_t count = 0;
     double open = 0.0;
@@ -121,13 +131,13 @@ static double open_share(const vshi_ao_cones *cones, const float *close, vshi_ve
 }
 
 static void flush(const vshi_ao_task *task, vshi_chunk *chunk, float *close, vsh_shade_stats *stats) {
-    vshi_chunk_march(chunk, task->kernel, task->field, VSHI_MARCH_GROWN, task->options->max_steps, stats);
-    for (size_t r = 0; r < chunk->rays.count; ++r) {
-        const float closeness = chunk->rays.close[r], sine = chunk->rays.sine[r];
+    vshi_chunk_march(chunk, task->kernel, task->field, VSHI_MARCH_GROWN, task->options.max_steps, stats);
+    for (size_t r = 0; r < chunk->count; ++r) {
+        const float closeness = chunk->close[r], sine = chunk->sine[r];
         close[chunk->owner[r]] = closeness;
         stats->certified += closeness >= sine || closeness <= -sine;
     }
-    vshi_chunk_clear(chunk);
+    chunk->count = 0;
 }
 
 void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
@@ -138,7 +148,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
     float close[VSHI_AO_GRAIN * VSHI_AO_MAX_CONES];
     bool valid[VSHI_AO_GRAIN];
     vshi_vec axes[VSHI_AO_GRAIN][3];
-    vshi_chunk_clear(&chunk);
+    chunk.count = 0;
     for (size_t i = begin; i < end; ++i) {
         vshi_ao_frame frame;
         valid[i - begin] = vshi_ao_frame_at(task, i, &frame, stats);
@@ -148,7 +158,7 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
         frame.grown = vshi_shade_grown(task->field, frame.origin);
         memcpy(axes[i - begin], frame.axes, sizeof frame.axes);
         ++stats->samples;
-        if (chunk.rays.count + count > VSHI_CHUNK) {
+        if (chunk.count + count > VSHI_CHUNK) {
             flush(task, &chunk, close, stats);
         }
         for (size_t c = 0; c < count; ++c) {
@@ -184,7 +194,8 @@ void vshi_ao_by_cones(const void *user, size_t begin, size_t end, vsh_shade_stat
         if (task->bent != NULL) {
             const double length = vshi_length(where);
             const vshi_vec d = vshi_ao_direction(axis, where);
-            vshi_ao_set_bent(task, i, vshi_scale(vshi_direction_to_world(task->field, d), length));
+            vshi_vec_to_floats(vshi_scale(vshi_direction_to_world(task->field, d), length),
+                               task->bent + 3 * i);
         }
     }
 }

@@ -1,12 +1,12 @@
-/* Blocks of points against a light.
+/* Proofs for blocks of points.
  *
  * The cones of all points of a ball of radius r towards one light lie in a beam: the cone of the same half
- * angle whose radius at the ball's centre is r, or for lamps the hull of the ball and the lamp. Where balls
- * that are free for certain cover the beam up to the light, so they do each cone; where a solid ball is as
- * wide as the beam, every ray of it is hidden.
+ * angle whose radius at the ball's centre is r, or for lamps the hull of the ball and the lamp. If free balls
+ * cover the beam up to the light, they cover each cone. If a solid ball is as wide as the beam, it hides
+ * every ray.
  *
  * Near its points a beam holds their own surface. There each point is on its own, with the ball that touches
- * its tangent plane: it holds the rays of its cone from next to the point to where the beams of its
+ * its tangent plane. This ball holds the rays of its cone from next to the point to where the beams of its
  * neighbours are clear of the surface. */
 #include "shade/shadow.h"
 
@@ -15,35 +15,29 @@
 enum { SIZES = 3, SMALLEST = 4 };
 static const size_t SIZE[SIZES] = {64, 16, SMALLEST}; /* points of a block */
 
-/* Beams that are wider than this at their points hold too much for anything to be proved, voxels. */
+/* Wider beams hold too much for proofs, voxels. */
 static const double WIDEST = 24.0;
-/* Cones that are left this long are worth a look at smaller blocks, voxels. */
+/* Cones this short, voxels, are worth a try with smaller blocks. */
 static const double SHORT = 48.0;
-/* Radius of the ball above a point, voxels: as much as the finest level's band holds. What it may lack of the
- * height of its centre, so that its rays enter it by then. */
+/* Height of the centre of the ball above a point, voxels: as much as the finest level's band holds. The
+ * radius is less by NEAR_LACK, and rays enter the ball by then. */
 static const double NEAR_HEIGHT = 1.95, NEAR_LACK = 0.05;
 
-/* Whether it pays to look at less than the largest blocks where those leave cones open up to `end`: always
- * where a point's cone takes more than one march. */
-static bool worthwhile(const vshi_shadow_task *task, double end) {
-    return vshi_shadow_has_rays(task->options) || end < SHORT;
-}
-
-/* See vshi_rays.deeper: a march may go a quarter of its cone's radius past its deepest place before its next
- * sample, and that sample may read up to 0.7 voxels of its level less deep than it is. */
+/* See vshi_chunk.deeper: a march may pass the deepest place of its cone by a quarter of its radius before the
+ * next sample. This sample may read up to 0.7 voxels of its level less deep. */
 static const double DEEPER = 0.25, READ = 0.71;
 
 /* --- the ball above each point */
 
-/* Looked at for every point, whatever its neighbours prove: where a march begins decides where it samples.
- * `improved` takes more from its first samples than any other method, and begins at the surface. */
+/* Tests every point, whatever its neighbours prove: the begin of a march decides its samples. `improved`
+ * depends most on its first samples, and begins at the surface. */
 static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_shade_stats *stats) {
     static const double LEAST_SINE = 0.1; /* of the cone's lowest ray over the plane */
     float centres[3][VSHI_PIECE];
     bool is_free[VSHI_PIECE];
     uint32_t owner[VSHI_PIECE];
     size_t count = 0;
-    if (task->options->method == VSH_SHADOW_IMPROVED || task->field->unknown) {
+    if (task->options.method == VSH_SHADOW_IMPROVED || task->field->unknown) {
         return;
     }
     for (size_t i = 0; i < facing->count; ++i) {
@@ -62,8 +56,8 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
     for (size_t b = 0; b < count; ++b) {
         if (is_free[b]) {
             vshi_cone *cone = &facing->cone[owner[b]];
-            /* where the lowest ray leaves the ball, whose sine is the axis's less at most the cone's; along
-             * the axis */
+            /* The lowest ray leaves the ball here, along the axis. Its sine is the axis's less at most the
+             * cone's. */
             const double rise = NEAR_HEIGHT * (cone->horizon - cone->sine);
             const double square = rise * rise - lack, cosine = sqrt(1.0 - cone->sine * cone->sine);
             cone->begin = square > 0.0 ? cosine * (rise + sqrt(square)) : 0.0;
@@ -76,33 +70,22 @@ static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_sh
 typedef struct block {
     size_t first, count;
     vshi_cone beam;
-    double distance; /* to a lamp's middle; of suns 0 */
-    double ends;     /* of one march a point: where the first of the cones ends, along the beam */
-    double tilt;     /* sine of the most that an axis of its cones is off the beam's */
+    double distance; /* to a lamp's middle; 0 for suns */
+    double ends;     /* with one march a point: the nearest end of a cone, along the beam */
+    double tilt;     /* sine of the largest angle between a cone's axis and the beam's */
 } block;
 
 static inline double least(double a, double b) {
     return a < b ? a : b;
 }
 
-/* How far the points themselves are below where their cones begin, voxels. */
+/* The height of the cones' origins above the points, voxels. */
 static double below(const vshi_shadow_task *task) {
-    return vshi_shade_lift(task->field, task->options);
+    return vshi_shade_lift(task->field, &task->options);
 }
 
-/* What one march makes of a cone is its point's value, and nothing is left out that would show in it: where
- * the beam is free from a place on, so are the balls in the cones that begin before it, which at the place
- * are wider by the cosine of the half angle. */
-static void tighten(block *b) {
-    vshi_cone *beam = &b->beam;
-    const double sine = beam->sine, wider = 1.0 / sqrt(1.0 - sine * sine);
-    beam->wide *= wider;
-    beam->sine = sine * wider;
-    beam->deeper = DEEPER * (1.0 + sine) + READ;
-}
-
-/* Of one march a point: where a cone begins along its beam, and how far the cone goes, at most, while its
- * beam goes by 1. A lamp's beam is as far on its way to the lamp as its cones are. */
+/* With one march a point: where a cone begins along its beam, and how far the cone goes while its beam goes
+ * by 1. A lamp's beam and cones are equally far on their way. */
 static double along_of(const vshi_shadow_task *task, const block *b, const vshi_cone *cone) {
     return b->distance > 0.0 ? 0.0 : vshi_dot(vshi_sub(cone->origin, b->beam.origin), task->place.towards);
 }
@@ -113,18 +96,18 @@ static double pace_of(const vshi_shadow_task *task, const block *b, const vshi_c
                : 1.0;
 }
 
-/* Turns a beam that has its origin and width to the light, a lamp of `radius`, whose distance is told; 0
- * where it has none. False where the beam is as wide as its way is long. */
+/* Aims a beam at the light, a lamp of `radius`. Sets the distance, 0 for suns. False if the beam is as wide
+ * as its way is long. */
 static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam, double *distance) {
     *distance = 0.0;
     if (task->place.parallel) {
         beam->direction = task->place.towards;
-        beam->sine = task->options->method == VSH_SHADOW_HARD ? 0.0 : task->place.sine;
+        beam->sine = task->options.method == VSH_SHADOW_HARD ? 0.0 : task->place.sine;
         return true;
     }
-    /* the cones of one march towards a shape are not those towards the sphere around it */
-    const bool hard = task->options->method == VSH_SHADOW_HARD;
-    if (task->place.shape != NULL && !hard && !vshi_shadow_has_rays(task->options)) {
+    /* one march aims at the rectangle's disc, not at the sphere around the rectangle */
+    const bool hard = task->options.method == VSH_SHADOW_HARD;
+    if (task->place.is_rectangle && !hard && !vshi_shadow_has_rays(&task->options)) {
         return false;
     }
     const vshi_vec to = vshi_sub(task->place.centre, beam->origin);
@@ -138,9 +121,8 @@ static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam,
     return true;
 }
 
-/* Sine of the most that an axis of a block's cones is off its beam's. */
 static double tilt_of(const vshi_shadow_task *task, const vshi_facing *facing, const block *b) {
-    if (task->place.shape == NULL) {
+    if (!task->place.is_rectangle) {
         return b->beam.wide / b->distance;
     }
     double square = 0.0;
@@ -151,7 +133,7 @@ static double tilt_of(const vshi_shadow_task *task, const vshi_facing *facing, c
     return sqrt(square);
 }
 
-/* The beam around the cones of a block's points; false where there is none worth a look. */
+/* Aims the beam around the cones of a block's points. False if it is not worth a march. */
 static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, block *b) {
     const size_t last = b->first + b->count;
     vshi_vec low = facing->cone[b->first].origin, high = low;
@@ -172,8 +154,8 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
     if (!(beam->wide <= WIDEST)) {
         return false;
     }
-    const bool hard = task->options->method == VSH_SHADOW_HARD;
-    /* lamps are aimed at from the points, below where the cones begin */
+    const bool hard = task->options.method == VSH_SHADOW_HARD;
+    /* lamps are seen from the points, below the origins of the cones */
     const double radius = (hard ? 0.0 : task->place.radius) + below(task);
     if (!aim_at(task, radius, beam, &b->distance)) {
         return false;
@@ -181,11 +163,16 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
     if (b->distance > 0.0) {
         b->tilt = tilt_of(task, facing, b);
     }
-    /* from where the first of the cones is not yet proved to where the last is */
+    /* from the first begin of a cone to the last end */
     beam->begin = b->ends = INFINITY;
     beam->end = -INFINITY;
-    if (!vshi_shadow_has_rays(task->options)) {
-        tighten(b);
+    if (!vshi_shadow_has_rays(&task->options)) {
+        /* The result of one march is the value. If the widened beam is free from a place on, so are the balls
+         * of the cones, which are wider there by the cosine of the half angle. */
+        const double sine = beam->sine, wider = 1.0 / sqrt(1.0 - sine * sine);
+        beam->wide *= wider;
+        beam->sine = sine * wider;
+        beam->deeper = DEEPER * (1.0 + sine) + READ;
         for (size_t i = b->first; i < last; ++i) {
             const vshi_cone *cone = &facing->cone[i];
             const double along = along_of(task, b, cone);
@@ -200,7 +187,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
             beam->end = -least(-beam->end, -(along + ends));
             b->ends = least(b->ends, along + whole);
         }
-        if (b->distance > 0.0) { /* the balls in the cones go on behind where these end */
+        if (b->distance > 0.0) { /* the balls of the cones extend beyond their ends */
             beam->end = least(beam->end, b->distance) * (1.0 + radius / b->distance);
         }
         return beam->begin < beam->end;
@@ -217,7 +204,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
 
 /* Ends the cones of a block where its beam is free from `clear` on. */
 static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const block *b, double clear) {
-    const bool marched = !vshi_shadow_has_rays(task->options);
+    const bool marched = !vshi_shadow_has_rays(&task->options);
     const double aside = (task->place.radius + below(task) + b->beam.wide) * b->tilt,
                  ahead = 1.0 - b->tilt * b->tilt;
     for (size_t i = b->first; i < b->first + b->count; ++i) {
@@ -233,22 +220,13 @@ static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const blo
     }
 }
 
-static void hide(const vshi_shadow_task *task, vshi_facing *facing, const block *b, vsh_shade_stats *stats) {
-    for (size_t i = b->first; i < b->first + b->count; ++i) {
-        facing->settled[i] = true;
-        vshi_shadow_settle(task, facing->point[i], 0.0f, 0.0f);
+/* Whether every cone of a block meets a solid ball around its beam's `t` before it ends. */
+static bool hides_all(const vshi_shadow_task *task, const block *b, double t) {
+    if (vshi_shadow_has_rays(&task->options)) {
+        /* a solid in the beam may stand behind a part of the rectangle */
+        return !task->place.is_rectangle || t <= b->distance - task->place.radius - below(task);
     }
-    stats->certified += b->count;
-}
-
-/* Whether every cone of a block comes to a solid ball around its beam's `t` before it ends. */
-static bool is_met(const vshi_shadow_task *task, const block *b, double t) {
-    const double beyond = DEEPER * fmax(1.0, b->beam.sine * t);
-    if (vshi_shadow_has_rays(task->options)) {
-        /* what fills the beam to a shape may stand behind a part of it */
-        return task->place.shape == NULL || t <= b->distance - task->place.radius - below(task);
-    }
-    return t + beyond <= b->ends;
+    return t + DEEPER * fmax(1.0, b->beam.sine * t) <= b->ends;
 }
 
 static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s, vshi_chunk *chunk,
@@ -256,13 +234,16 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
     const size_t size = SIZE[s];
     block blocks[VSHI_PIECE / SMALLEST];
     size_t count = 0;
-    vshi_chunk_clear(chunk);
+    chunk->count = 0;
     for (size_t first = 0; first < facing->count; first += size) {
         block *b = &blocks[count];
         const size_t left = facing->count - first;
         *b = (block){.first = first, .count = left < size ? left : size};
-        if (2 * b->count <= size || !aim_beam(task, facing, b) || (s > 0 && !worthwhile(task, b->beam.end))) {
+        if (2 * b->count <= size || !aim_beam(task, facing, b)) {
             continue;
+        }
+        if (s > 0 && !vshi_shadow_has_rays(&task->options) && !(b->beam.end < SHORT)) {
+            continue; /* smaller blocks pay for short cones, or if a point needs several marches */
         }
         if (vshi_chunk_add(chunk, task->field, &b->beam, (uint32_t)count, stats)) {
             ++count;
@@ -270,16 +251,19 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
             shorten(task, facing, b, b->beam.begin);
         }
     }
-    vshi_chunk_march(chunk, task->kernel, task->field, VSHI_MARCH_BEAM, task->options->max_steps, stats);
-    for (size_t r = 0; r < chunk->rays.count; ++r) {
+    vshi_chunk_march(chunk, task->kernel, task->field, VSHI_MARCH_BEAM, task->options.max_steps, stats);
+    for (size_t r = 0; r < chunk->count; ++r) {
         block *b = &blocks[chunk->owner[r]];
-        const double clear = (double)chunk->rays.clear[r];
-        if (chunk->rays.proof[r] == VSHI_PROVED_FULL) {
-            if (!task->leaky && is_met(task, b, clear)) {
-                hide(task, facing, b, stats);
+        const double clear = (double)chunk->clear[r];
+        if (chunk->proof[r] == VSHI_PROVED_FULL) {
+            const bool hidden = !task->leaky && hides_all(task, b, clear);
+            for (size_t i = b->first; hidden && i < b->first + b->count; ++i) {
+                facing->settled[i] = true;
+                vshi_shadow_settle(task, facing->point[i], 0.0f, 0.0f);
             }
-        } else if (clear < (double)chunk->rays.end[r]) {
-            shorten(task, facing, b, clear > (double)chunk->rays.begin[r] ? clear : b->beam.begin);
+            stats->certified += hidden ? b->count : 0;
+        } else if (clear < (double)chunk->end[r]) {
+            shorten(task, facing, b, clear > (double)chunk->begin[r] ? clear : b->beam.begin);
         }
         for (size_t i = b->first; i < b->first + b->count; ++i) {
             facing->gathered[i] = true;
@@ -287,21 +271,17 @@ static void prove_size(const vshi_shadow_task *task, vshi_facing *facing, int s,
     }
 }
 
-/* Drops the points that are settled. */
+/* Drops settled points. */
 static void keep_open(vshi_facing *facing) {
     size_t left = 0;
     for (size_t i = 0; i < facing->count; ++i) {
-        if (facing->settled[i]) {
-            continue;
-        }
-        if (left < i) {
+        if (!facing->settled[i]) {
             facing->point[left] = facing->point[i];
             facing->normal[left] = facing->normal[i];
             facing->cone[left] = facing->cone[i];
             facing->settled[left] = false;
-            facing->gathered[left] = facing->gathered[i];
+            facing->gathered[left++] = facing->gathered[i];
         }
-        ++left;
     }
     facing->count = left;
 }
@@ -317,17 +297,16 @@ void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_c
             prove_near(task, facing, stats);
         }
     }
-    vshi_chunk_clear(chunk);
+    chunk->count = 0;
 }
 
 /* --- balls of free space */
 
-/* The beam around the cones of all points of a ball; false where there is none worth a look. */
+/* Aims the beam around the cones of all points of a ball. False if it is not worth a march. */
 static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radius, vshi_cone *beam) {
-    const bool hard = task->options->method == VSH_SHADOW_HARD;
+    const bool hard = task->options.method == VSH_SHADOW_HARD;
     *beam = (vshi_cone){.origin = centre, .wide = radius + 1e-3, .end = INFINITY};
-    const vshi_light_shape *shape = task->place.shape;
-    if (shape != NULL && !shape->faces(&task->place, centre, beam->wide)) {
+    if (task->place.is_rectangle && !vshi_rectangle_faces(&task->place, centre, beam->wide)) {
         return false;
     }
     double distance;
@@ -335,8 +314,8 @@ static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radiu
         return false;
     }
     if (distance > 0.0) {
-        /* no cone goes on behind the lamp's middle, or the last of a shape */
-        beam->end = distance + beam->wide + (shape != NULL ? task->place.radius : 0.0);
+        /* no cone extends beyond the lamp's middle, or the end of a rectangle */
+        beam->end = distance + beam->wide + (task->place.is_rectangle ? task->place.radius : 0.0);
     }
     return true;
 }
@@ -344,7 +323,7 @@ static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radiu
 void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const vshi_vec *centre,
                              const double *radius, int8_t *proof, vsh_shade_stats *stats) {
     vshi_chunk chunk;
-    vshi_chunk_clear(&chunk);
+    chunk.count = 0;
     const bool parallel = task->place.parallel;
     for (size_t i = 0; i < count; ++i) {
         vshi_cone beam;
@@ -354,12 +333,12 @@ void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const v
             proof[i] = VSHI_PROVED_FREE;
         }
     }
-    vshi_chunk_march(&chunk, task->kernel, task->field, VSHI_MARCH_BEAM, task->options->max_steps, stats);
-    for (size_t r = 0; r < chunk.rays.count; ++r) {
-        if (chunk.rays.proof[r] == VSHI_PROVED_FULL) {
-            /* what hides a lamp may stand behind it, as seen from some of the points */
+    vshi_chunk_march(&chunk, task->kernel, task->field, VSHI_MARCH_BEAM, task->options.max_steps, stats);
+    for (size_t r = 0; r < chunk.count; ++r) {
+        if (chunk.proof[r] == VSHI_PROVED_FULL) {
+            /* the occluder may stand behind the lamp as seen from some points */
             proof[chunk.owner[r]] = parallel && !task->leaky ? VSHI_PROVED_FULL : VSHI_UNPROVED;
-        } else if (chunk.rays.clear[r] <= chunk.rays.begin[r]) {
+        } else if (chunk.clear[r] <= chunk.begin[r]) {
             proof[chunk.owner[r]] = VSHI_PROVED_FREE;
         }
     }

@@ -1,9 +1,9 @@
-/* A point is inside a solid if what a ray from it meets first is the inner side of one: so two rays nearly
- * always tell. Of points that they do not agree on, more rays are cast, and followed all the way: a ray
- * leaves one solid more than it enters for each that holds its origin, also where solids overlap. Meshes have
- * holes and flipped faces, so a clear majority decides, and who is seen by many from outside is outside. */
-#include "shade/inside.h"
+/* Tells points in solids by rays. A point is inside if a ray first meets the inner side of a solid, so two
+ * rays nearly always decide. If they disagree, more rays are followed all the way: a ray leaves one solid
+ * more than it enters for each solid around its origin, also if solids overlap. Meshes have holes and flipped
+ * faces, so a clear majority decides, and a point seen by many rays from outside is outside. */
 #include "base/vec.h"
+#include "shade/shade.h"
 #include "trace/embree.h"
 
 #include <math.h>
@@ -11,33 +11,33 @@
 
 enum {
     AT_ONCE = 128,
-    FIRST = 2,  /* rays that all points have */
-    SECOND = 6, /* more, for those inside by the first if solids were not closed over holes: all must agree */
-    COUNTED = 3, /* rays that are followed all the way, for all others; where they disagree: */
+    FIRST = 2,   /* rays of every point */
+    SECOND = 6,  /* second rays, if the first ones meet solids that were closed over holes: all must agree */
+    COUNTED = 3, /* rays followed all the way for all other points; if they disagree: */
     MORE = 14,
-    TURNS = 4 /* where those do not tell clearly: as many times MORE, turned about the normal */
+    TURNS = 4 /* if these leave doubt: as many times MORE, turned about the normal */
 };
 
-/* The share of rays that must say inside, of those that disagree: a head's eye, seen through its hole by a
- * third of the rays, is to be baked. */
+/* Share of rays that must say inside if rays disagree. A head's eye, seen through its hole by a third of the
+ * rays, must be baked. */
 static const double MAJORITY = 0.72;
 
-/* Between these shares of MORE, as many more are asked. */
+/* Between these shares of MORE, more rays are cast. */
 static const double UNCLEAR[2] = {0.5, 0.95};
 
-/* Points that are linked by a ray face the same way to within this (cosine). */
+/* Linked points have normals with at least this cosine. */
 static const double ALIKE = 0.9;
 
-/* And of all of them, where the COUNTED agree on inside and one of the first does not: under the mouth of a
- * pipe whose faces look inwards three rays go into it, and more than half escape. */
+/* The same share if the COUNTED rays say inside and a first ray does not. Under the mouth of a pipe whose
+ * faces look inwards, three rays enter the pipe, and more than half escape. */
 static const double AGREED = 2.0 / 3.0;
 
-/* Rays begin a little off the surface, and so on the wrong side of what is nearer than that. Those of points
- * inside by them, where something is, begin at this part of it: some roundings of a float. */
+/* Rays begin a little off the surface, so on the wrong side of closer triangles. Points found inside that
+ * have such a triangle begin at this part of the distance: some roundings of a float. */
 static const double NEARER = 0.25;
 
-/* Directions over a hemisphere around +z, none along an axis, where the edges of what people build lie: the
- * golden angle apart, from 18° to 75° off the normal. The first two lean to opposite sides. */
+/* Directions over a hemisphere around +z, a golden angle apart, from 18° to 75° off the normal. None lies
+ * along an axis, as the edges of buildings do. The first two lean to opposite sides. */
 static const double DIRECTIONS[FIRST + MORE][3] = {
     {+0.44378, +0.13502, 0.88590}, {-0.61737, -0.22410, 0.75408}, {+0.29617, -0.50253, 0.81225},
     {-0.10473, +0.65201, 0.75094}, {+0.73921, +0.24787, 0.62620}, {-0.66702, +0.53311, 0.52042},
@@ -47,35 +47,35 @@ static const double DIRECTIONS[FIRST + MORE][3] = {
     {+0.88915, -0.22030, 0.40107},
 };
 
-/* Cosine and sine of what a turn turns them by: 23° each, so that none comes to lie on another. */
+/* Cosine and sine of the turns: 23° each, so that no direction repeats. */
 static const double TURNED[TURNS][2] = {{1.0, 0.0},
                                         {0.92050485345244033, 0.39073112848927377},
                                         {0.69465837045899725, 0.71933980033865119},
                                         {0.35836794954530027, 0.93358042649720174}};
 
-typedef struct looking {
-    const vsh_triangles *triangles;
+typedef struct solid_test {
+    const vshi_triangles *triangles;
     const double *positions; /* [count][3] */
     const float *normals;
     double lift;
-    bool holes; /* solids have some: a ray that escapes proves nothing */
+    bool holes; /* solids have holes: a ray that escapes proves nothing */
     vshi_open_fn *open;
     const void *user;
-} looking;
+} solid_test;
 
-/* A place where a point's rays begin. */
-static vshi_vec lifted(const looking *l, size_t point) {
+/* The origin of a point's rays. */
+static vshi_vec origin_of(const solid_test *l, size_t point) {
     const vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point));
     return vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
 }
 
-/* A place where a point's rays begin, and axes for their directions. */
+/* The origin of a point's rays, and axes for their directions. */
 typedef struct frame {
     vshi_vec origin, u, v, normal;
 } frame;
 
-static frame frame_of(const looking *l, size_t point) {
-    frame f = {.origin = lifted(l, point), .normal = vshi_unit(vshi_vec_off(l->normals + 3 * point))};
+static frame frame_of(const solid_test *l, size_t point) {
+    frame f = {.origin = origin_of(l, point), .normal = vshi_unit(vshi_vec_off(l->normals + 3 * point))};
     if (!(vshi_dot(f.normal, f.normal) > 0.5)) {
         f.normal = (vshi_vec){0.0, 0.0, 1.0};
     }
@@ -89,22 +89,22 @@ static vshi_segment_ray aim_in(const frame *f, double x, double y, double z) {
     return (vshi_segment_ray){{f->origin.x, f->origin.y, f->origin.z}, {d.x, d.y, d.z}, INFINITY};
 }
 
-static void aim(const looking *l, size_t point, size_t direction, vshi_segment_ray *ray) {
+static void aim(const solid_test *l, size_t point, size_t direction, vshi_segment_ray *ray) {
     const size_t turn = direction < FIRST ? 0 : (direction - FIRST) / MORE;
     const double *by = DIRECTIONS[direction - turn * MORE], c = TURNED[turn][0], s = TURNED[turn][1];
     const frame f = frame_of(l, point);
     *ray = aim_in(&f, c * by[0] - s * by[1], s * by[0] + c * by[1], by[2]);
 }
 
-/* Whether a ray begins in a solid, followed all the way. */
-static bool begins_inside(const looking *l, size_t point, int direction) {
+/* Whether a ray, followed all the way, begins in a solid. */
+static bool begins_inside(const solid_test *l, size_t point, int direction) {
     vshi_segment_ray ray;
     aim(l, point, (size_t)direction, &ray);
     return vshi_triangles_depth(l->triangles, &ray) > 0;
 }
 
-/* Follows rays all the way: more of them where they disagree, with each other or with the first. */
-static uint8_t count_through(const looking *l, size_t point) {
+/* Follows rays all the way, more if they disagree with each other or with the first. */
+static uint8_t count_through(const solid_test *l, size_t point) {
     int inside = 0, all = MORE;
     double share = MAJORITY;
     for (int k = 0; k < COUNTED; ++k) {
@@ -138,8 +138,8 @@ static uint8_t count_through(const looking *l, size_t point) {
     return VSHI_INSIDE;
 }
 
-/* For a point whose first rays all begin in solids with holes: whether others do as well. */
-static uint8_t confirm(const looking *l, size_t point) {
+/* For a point whose first rays all begin in solids with holes: whether the second rays do too. */
+static uint8_t confirm(const solid_test *l, size_t point) {
     vshi_segment_ray rays[SECOND];
     uint8_t meets[SECOND];
     for (size_t k = 0; k < SECOND; ++k) {
@@ -154,12 +154,12 @@ static uint8_t confirm(const looking *l, size_t point) {
     return VSHI_INSIDE;
 }
 
-/* Looks at `count` points, which are listed. */
-static void look(const looking *l, const size_t *points, size_t count, uint8_t *where) {
+/* Tests the listed points. */
+static void test_points(const solid_test *l, const size_t *points, size_t count, uint8_t *where) {
     vshi_segment_ray rays[FIRST * AT_ONCE];
     uint8_t meets[FIRST * AT_ONCE];
     size_t asked = 0;
-    for (size_t k = 0; k < FIRST; ++k) { /* those of neighbours together: they go the same way */
+    for (size_t k = 0; k < FIRST; ++k) { /* rays of neighbours together: they are similar */
         for (size_t i = 0; i < count; ++i) {
             aim(l, points[i], k, &rays[asked++]);
         }
@@ -185,10 +185,10 @@ static void look(const looking *l, const size_t *points, size_t count, uint8_t *
     }
 }
 
-/* Looks again at the points first … first + count - 1 that are inside and have a triangle closer than the
+/* Tests the points first … first + count - 1 again if they are inside and have a triangle closer than the
  * lift. */
-static void look_nearer(const looking *l, size_t first, size_t count, uint8_t *where) {
-    looking nearer = *l;
+static void retest_nearer(const solid_test *l, size_t first, size_t count, uint8_t *where) {
+    solid_test nearer = *l;
     nearer.lift *= NEARER;
     vshi_segment_ray rays[AT_ONCE];
     size_t of[AT_ONCE], some = 0;
@@ -206,24 +206,24 @@ static void look_nearer(const looking *l, size_t first, size_t count, uint8_t *w
     }
     for (size_t k = 0; k < some; ++k) {
         if (blocked[k]) {
-            look(&nearer, &of[k], 1, where);
+            test_points(&nearer, &of[k], 1, where);
         }
     }
 }
 
-/* Which of the points first … first + count - 1 are linked to the one before, by a ray that no triangle cuts:
- * what is said of that one holds for them, too. */
-static void link_points(const looking *l, const bool *follows, size_t first, size_t count, bool *linked) {
+/* Finds which points first … first + count - 1 are linked to the one before: no triangle cuts a ray between
+ * them, so they share a result. */
+static void link_points(const solid_test *l, const bool *follows, size_t first, size_t count, bool *linked) {
     vshi_segment_ray rays[AT_ONCE];
     size_t of[AT_ONCE], some = 0;
     bool blocked[AT_ONCE];
     for (size_t k = 0; k < count; ++k) {
         const size_t i = first + k;
         linked[k] = false;
-        if (follows == NULL || !follows[i] || l->holes) { /* beside a hole rays disagree more and more */
+        if (follows == NULL || !follows[i] || l->holes) { /* rays disagree more and more near a hole */
             continue;
         }
-        const vshi_vec from = lifted(l, i - 1), way = vshi_sub(lifted(l, i), from);
+        const vshi_vec from = origin_of(l, i - 1), way = vshi_sub(origin_of(l, i), from);
         const double length = vshi_length(way);
         const double alike =
             vshi_dot(vshi_vec_off(l->normals + 3 * i), vshi_vec_off(l->normals + 3 * (i - 1)));
@@ -241,8 +241,9 @@ static void link_points(const looking *l, const bool *follows, size_t first, siz
     }
 }
 
-/* Looks at the points first … first + count - 1. */
-static void look_linked(const looking *l, const bool *follows, size_t first, size_t count, uint8_t *where) {
+/* Tests the points first … first + count - 1. */
+static void test_linked(const solid_test *l, const bool *follows, size_t first, size_t count,
+                        uint8_t *where) {
     bool linked[AT_ONCE];
     size_t points[AT_ONCE], some = 0;
     link_points(l, follows, first, count, linked);
@@ -252,7 +253,7 @@ static void look_linked(const looking *l, const bool *follows, size_t first, siz
         }
     }
     if (some > 0) {
-        look(l, points, some, where);
+        test_points(l, points, some, where);
     }
     for (size_t k = 0; k < count; ++k) {
         where[first + k] = where[first + k - (linked[k] ? 1 : 0)];
@@ -260,12 +261,12 @@ static void look_linked(const looking *l, const bool *follows, size_t first, siz
 }
 
 /* Whether a point sees only inner sides of solids and vessels, as below a house without a floor. Flat rays
- * find the gap below a cloth that hangs over a table. */
-static bool is_hidden(const looking *l, size_t point) {
+ * find the gap below a cloth on a table. */
+static bool is_hidden(const solid_test *l, size_t point) {
     enum { ALL = FIRST + MORE };
-    static const double FLAT = 0.06; /* tangent of their height over the surface */
+    static const double FLAT = 0.06; /* tangent of their height above the surface */
     const frame f = frame_of(l, point);
-    for (size_t k = 0; k < 2 * ALL; ++k) { /* mostly one of the first escapes */
+    for (size_t k = 0; k < 2 * ALL; ++k) { /* one of the first rays mostly escapes */
         const double *by = DIRECTIONS[k % ALL];
         const double up = k < ALL ? FLAT * sqrt(by[0] * by[0] + by[1] * by[1]) : by[2];
         const vshi_segment_ray ray = aim_in(&f, by[0], by[1], up);
@@ -276,9 +277,8 @@ static bool is_hidden(const looking *l, size_t point) {
     return true;
 }
 
-/* Finds the hidden ones of points first … first + count - 1 that are outside: there is a triangle above each.
- */
-static void look_for_hidden(const looking *l, size_t first, size_t count, uint8_t *where) {
+/* Finds hidden points among first … first + count - 1 that are outside. They have a triangle above. */
+static void find_hidden(const solid_test *l, size_t first, size_t count, uint8_t *where) {
     vshi_segment_ray rays[AT_ONCE];
     bool blocked[AT_ONCE];
     for (size_t k = 0; k < count; ++k) {
@@ -293,24 +293,24 @@ static void look_for_hidden(const looking *l, size_t first, size_t count, uint8_
     }
 }
 
-void vshi_inside(const vsh_triangles *triangles, size_t count, const double *positions, const float *normals,
+void vshi_inside(const vshi_triangles *triangles, size_t count, const double *positions, const float *normals,
                  const bool *follows, vshi_open_fn *open, const void *user, uint8_t *where) {
     memset(where, VSHI_OUTSIDE, count);
     if (!vshi_triangles_have_solids(triangles)) {
         return;
     }
-    const looking l = {
+    const solid_test l = {
         triangles, positions, normals, vshi_triangles_lift(triangles), vshi_triangles_have_holes(triangles),
         open,      user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
-        look_linked(&l, follows, first, some, where);
+        test_linked(&l, follows, first, some, where);
     }
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
-        look_nearer(&l, first, some, where);
+        retest_nearer(&l, first, some, where);
         if (vshi_triangles_have_vessels(triangles)) {
-            look_for_hidden(&l, first, some, where);
+            find_hidden(&l, first, some, where);
         }
     }
 }

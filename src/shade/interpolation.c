@@ -1,17 +1,20 @@
-#include "shade/interpolation.h"
+/* Values of texels between anchors in the same square of a lightmap. */
+#include "shade/shadow.h"
 
 #include <math.h>
 #include <string.h>
 
 enum { SIDE = 8 }; /* texels of the largest square */
 
-/* A square's points that are known: a grid of three by three, or its corners and its middle. */
+/* The anchors of a square: a grid of three by three, or its corners and its middle. */
 typedef struct pattern {
     int size;     /* texels along a side */
     int place[3]; /* of the grid, along either side */
-    bool edges;   /* whether the middles of sides are known too */
-    double agree; /* what an anchor may differ from what those farther apart say, of max_error */
-    double keeps; /* of that difference, what is left between: curvature falls with the square of a step */
+    bool edges;   /* whether the middles of sides are anchors too */
+    double agree; /* limit of the difference between an anchor and its neighbours' interpolation, as a share
+                     of max_error */
+    double keeps; /* share of that difference that remains between anchors: curvature falls with the square of
+                     a step */
 } pattern;
 
 static const pattern LEVELS[VSHI_INTERPOLATION_LEVELS] = {
@@ -19,16 +22,16 @@ static const pattern LEVELS[VSHI_INTERPOLATION_LEVELS] = {
     {.size = 4, .place = {0, 2, 3}, .edges = false, .agree = 2.2, .keeps = 0.33},
 };
 
-/* Where light bends more than a parabola does, at the ends of penumbrae, more is left between. */
+/* Factor on the remaining difference: at the ends of penumbrae light bends more than a parabola. */
 static const double MORE = 2.0;
-/* Where errors below this are asked for, anchors agree that differ by less. */
+/* Below FINE anchors must agree better, by the factor FINER. */
 static const double FINE = 0.01, FINER = 0.7;
 
-/* Corners differ by at most this: an edge between them is not seen from the middle. */
+/* Corners may differ by this: the middle does not show an edge between them. */
 static const double RANGE = 0.5;
-/* Standard errors that rays may be off. */
+/* Standard errors by which rays may differ. */
 static const double SIGMAS = 2.5;
-/* Points lie so flat, of the square's size, and their normals within so much (cosine) of each other. */
+/* Flatness of the points, as a share of the square's size, and cosine between their normals. */
 static const double FLAT = 0.1, ALIKE = 0.98;
 
 typedef struct square {
@@ -41,10 +44,6 @@ typedef struct square {
 static uint32_t square_of(const vshi_interpolation *interp, size_t k) {
     const uint32_t texel = interp->points->texels[interp->begin + k];
     return (texel & 0xfff8fff8u) >> 3;
-}
-
-bool vshi_interpolation_can(const vsh_points *points) {
-    return points->texels != NULL && points->normals != NULL;
 }
 
 int32_t vshi_interpolation_rays(double max_error) {
@@ -65,7 +64,7 @@ void vshi_interpolation_begin(vshi_interpolation *interp) {
     interp->run_begin[interp->runs] = (uint16_t)interp->count;
 }
 
-/* Lays a run's points out. False where two have the same place, or none is open. */
+/* Lays out a run's points. False if two share a place, or none is open. */
 static bool lay_out(square *s, size_t run) {
     const vshi_interpolation *interp = s->interp;
     bool open = false;
@@ -104,7 +103,7 @@ static vshi_vec mix(const vshi_vec p[4], double x, double y) {
     return vshi_add(vshi_scale(top, 1.0 - y), vshi_scale(bottom, y));
 }
 
-/* Whether the anchors are there, some points are open, and those lie in a plane and are turned alike. */
+/* Whether all anchors exist, some points are open, and the open ones lie in a plane with similar normals. */
 static bool is_even(const square *s) {
     const pattern *p = s->pattern;
     const int last = p->size - 1;
@@ -159,7 +158,7 @@ static void each_square(vshi_interpolation *interp, int level,
     }
 }
 
-static void want(vshi_interpolation *interp, const square *s) {
+static void mark_anchors(vshi_interpolation *interp, const square *s) {
     const pattern *p = s->pattern;
     for (int j = 0; j < 3; ++j) {
         for (int i = 0; i < 3; ++i) {
@@ -172,7 +171,7 @@ static void want(vshi_interpolation *interp, const square *s) {
 }
 
 bool vshi_interpolation_pick(vshi_interpolation *interp, int level) {
-    each_square(interp, level, want);
+    each_square(interp, level, mark_anchors);
     return memchr(interp->state, VSHI_INTERPOLATION_WANTED, interp->count) != NULL;
 }
 
@@ -180,15 +179,15 @@ bool vshi_interpolation_pick(vshi_interpolation *interp, int level) {
 
 typedef struct anchors {
     double value[3][3], variance[3][3];
-    double part;    /* where the middle lies between its neighbours, 0 … 1 */
-    double surplus; /* most that a middle differs from what the corners say of it */
+    double part;    /* place of the middle between its neighbours, 0 … 1 */
+    double surplus; /* largest difference between a middle and the corners' interpolation */
 } anchors;
 
 static void raise(anchors *a, double difference) {
     a->surplus = fmax(a->surplus, fabs(difference));
 }
 
-/* The middle of a side, from its ends where it is not known itself. */
+/* Interpolates the middle of a side from its ends, unless it is known. */
 static void fill_side(anchors *a, bool known, double *value, double *variance, const double ends[2],
                       const double variances[2]) {
     const double f = a->part, between = ends[0] * (1.0 - f) + ends[1] * f;
@@ -200,7 +199,7 @@ static void fill_side(anchors *a, bool known, double *value, double *variance, c
     *variance = variances[0] * (1.0 - f) * (1.0 - f) + variances[1] * f * f;
 }
 
-/* Values of a square's anchors; false where one is not known, or they do not agree. */
+/* Reads the anchors of a square. False if one is not known, or they disagree. */
 static bool read(const square *s, anchors *a) {
     const pattern *p = s->pattern;
     const vshi_interpolation *interp = s->interp;
@@ -227,7 +226,7 @@ static bool read(const square *s, anchors *a) {
     const double f = a->part;
     const double top = v[0][0] * (1.0 - f) + v[0][2] * f, bottom = v[2][0] * (1.0 - f) + v[2][2] * f;
     raise(a, v[1][1] - (top * (1.0 - f) + bottom * f));
-    raise(a, 0.5 * (v[0][0] - v[0][2] - v[2][0] + v[2][2])); /* one corner alone hardly shows in the middle */
+    raise(a, 0.5 * (v[0][0] - v[0][2] - v[2][0] + v[2][2])); /* the middle hardly shows a single corner */
     for (int e = 0; e < 3; e += 2) {
         fill_side(a, p->edges, &v[e][1], &w[e][1], (double[]){v[e][0], v[e][2]},
                   (double[]){w[e][0], w[e][2]});
@@ -272,7 +271,7 @@ static void mix_open(const square *s, const anchors *a, between *found) {
     }
 }
 
-/* Whether the open points' own rays say the same, each and on average. */
+/* Whether the open points' own rays agree, each and on average. */
 static bool rays_agree(const vshi_interpolation *interp, const between *found) {
     double sum = 0.0, variance = 0.0;
     for (size_t n = 0; n < found->count; ++n) {

@@ -9,30 +9,21 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* A layer as one light or AO sees it. */
+/* A layer, prepared for one light or for AO. */
 typedef struct prepared {
-    vsh_layer layer;
+    vshi_layer layer;
     vsh_light light;
-    vsh_shade_options options;
-    vshi_sampler *sampler;
-    vshi_shadow_task shadow; /* refers to the three above */
+    vshi_shadow_task shadow; /* of heights and spheres only the options */
     vshi_ao_task ao;
 } prepared;
 
 struct vshi_layers {
     size_t count;
-    vshi_ao_cones cones; /* of all: they do not depend on the field */
     prepared items[];
 };
 
-static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error) {
-    *layer = vsh_layer_default();
-    VSHI_TRY(vshi_options_resolve(given, layer, sizeof *layer, "vsh_layer", error));
-    layer->struct_size = sizeof *layer;
-    const struct {
-        const char *name;
-        double value, low, high;
-    } fields[] = {
+static vsh_result check_layer(const vshi_layer *layer, vsh_error *error) {
+    const vshi_range ranges[] = {
         {"method", layer->method, -1, VSH_SHADOW_AUTO},
         {"combine", layer->combine, VSH_COMBINE_MULTIPLY, VSH_COMBINE_MIN},
         {"softness", layer->softness, 0, 1000},
@@ -40,12 +31,7 @@ static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error)
         {"remap[1]", layer->remap[1], layer->remap[0], 1},
         {"start_offset", layer->start_offset, -1, 16},
     };
-    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
-        if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", fields[i].name,
-                             fields[i].value, fields[i].low, fields[i].high);
-        }
-    }
+    VSHI_TRY(vshi_check_ranges(ranges, sizeof ranges / sizeof ranges[0], error));
     if (layer->remap[1] > 0.0 && !(layer->remap[0] < layer->remap[1])) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
                          layer->remap[1]);
@@ -64,35 +50,22 @@ static vsh_result resolve(const void *given, vsh_layer *layer, vsh_error *error)
     return VSH_OK;
 }
 
-/* An error of a layer, which it names. */
+/* Adds the layer's number to an error. */
 static vsh_result name_layer(vsh_result result, size_t index, const vsh_error *why, vsh_error *error) {
     return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "layer %zu: %s", index, why->message);
 }
 
-vsh_result vshi_layer_resolve(const vsh_layer *layers, size_t index, vsh_layer *layer, vsh_error *error) {
-    /* programs that were built with a shorter struct step by its size */
-    const char *at = (const char *)layers + index * layers->struct_size;
+vsh_result vshi_layer_check(const vshi_layer *layers, size_t index, vsh_error *error) {
     vsh_error why;
-    return name_layer(resolve(at, layer, &why), index, &why, error);
+    return name_layer(check_layer(&layers[index], &why), index, &why, error);
 }
 
-double vshi_layer_bytes(const vsh_layer *layer) {
-    if (layer->heights != NULL) {
-        vsh_heights_info info;
-        vsh_heights_get_info(layer->heights, &info);
-        return (double)info.bytes;
+/* Whether a layer casts for a light, or for AO (NULL). Heights and spheres cast no ambient occlusion without
+ * a field. */
+static bool casts_for(const vshi_layer *layer, const vsh_light *light) {
+    if (light == NULL) {
+        return layer->ao != 0 && layer->field != NULL;
     }
-    if (layer->spheres != NULL) {
-        vsh_spheres_info info;
-        vsh_spheres_get_info(layer->spheres, &info);
-        return (double)info.bytes;
-    }
-    vsh_field_info info;
-    vsh_field_get_info(layer->field, &info);
-    return (double)info.bytes;
-}
-
-static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     bool casts = layer->lights == NULL;
     for (size_t i = 0; !casts && i < layer->light_count; ++i) {
         casts = strncmp(layer->lights[i], light->name, sizeof light->name) == 0;
@@ -100,43 +73,30 @@ static bool casts_for(const vsh_layer *layer, const vsh_light *light) {
     return casts;
 }
 
-/* Heights and spheres by themselves cast no ambient occlusion: their field, or triangles, do. */
-static bool casts_ao(const vsh_layer *layer) {
-    return layer->ao != 0 && layer->field != NULL;
-}
-
 static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh_light *light, bool sphere,
-                          vshi_ao_cones *cones, vsh_error *error) {
-    const vsh_layer *layer = &item->layer;
-    vsh_shade_options *options = &item->options;
+                          vsh_shade_options options, vsh_error *error) {
+    const vshi_layer *layer = &item->layer;
     const vsh_occluders own = {.field = layer->field, .triangles = layer->triangles, .lifted = lifted};
-    options->start_offset = layer->start_offset < 0.0 ? options->start_offset : layer->start_offset;
-    options->method = layer->method < 0 ? options->method : layer->method;
-    vshi_shade_options_settle(options, own.triangles);
-    if (light != NULL) {
-        item->light = vshi_light_resized(light, layer->softness);
+    options.start_offset = layer->start_offset < 0.0 ? options.start_offset : layer->start_offset;
+    options.method = layer->method < 0 ? options.method : layer->method;
+    if (light == NULL) {
+        return vshi_ao_prepare(&own, &options, sphere, &item->ao, error);
     }
-    if (light != NULL && vshi_layer_is_closed(layer)) {
-        if (options->method != VSH_SHADOW_HARD && options->method != VSH_SHADOW_CLASSIC) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                             "heights and spheres are shaded by the methods hard and classic; for method %s "
-                             "trace or voxelize them",
-                             vsh_get_name(VSH_NAMES_SHADOW, options->method));
-        }
-        return vsh_light_check(&item->light, error);
-    }
-    if (light != NULL) {
-        VSHI_TRY(vshi_shadow_prepare(&own, &item->light, options, &item->shadow, error));
+    item->light = vshi_light_resized(light, layer->softness);
+    if (!vshi_layer_is_closed(layer)) {
+        VSHI_TRY(vshi_shadow_prepare(&own, &item->light, &options, &item->shadow, error));
         item->shadow.purpose = 31u * item->shadow.purpose + (uint32_t)index + 1u;
-    } else {
-        VSHI_TRY(vshi_ao_prepare(&own, options, sphere, cones, &item->ao, error));
+        return VSH_OK;
     }
-    if (light != NULL ? vshi_shadow_has_rays(options) : vshi_ao_has_rays(options)) {
-        const int32_t rays = light != NULL ? vshi_shadow_most_rays(options) : vshi_ao_most_rays(options);
-        VSHI_TRY(vshi_shade_sampler(options, rays, "rays", &item->sampler, error));
-        item->shadow.sampler = item->ao.sampler = item->sampler;
+    vshi_shade_options_settle(&options, own.triangles);
+    item->shadow.options = options;
+    if (options.method != VSH_SHADOW_HARD && options.method != VSH_SHADOW_CLASSIC) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "heights and spheres are shaded by the methods hard and classic; for method %s "
+                         "trace or voxelize them",
+                         vsh_get_name(VSH_NAMES_SHADOW, options.method));
     }
-    return VSH_OK;
+    return vsh_light_check(&item->light, error);
 }
 
 vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
@@ -152,37 +112,37 @@ vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_o
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         prepared *item = &made->items[made->count];
         item->layer = occluders->layers[i];
-        if ((light != NULL ? casts_for(&item->layer, light) : casts_ao(&item->layer))) {
-            item->options = *options;
+        if (casts_for(&item->layer, light)) {
             ++made->count;
             vsh_error why;
-            VSHI_TRY_DONE(name_layer(prepare(item, i, occluders->lifted, light, sphere, &made->cones, &why),
-                                     i, &why, error));
+            VSHI_TRY_DONE(name_layer(prepare(item, i, occluders->lifted, light, sphere, *options, &why), i,
+                                     &why, error));
         }
     }
-    if (made->count > 0) {
-        *layers = made;
-        made = NULL;
-    }
 done:
-    vshi_layers_free(made);
+    if (result == VSH_OK && made->count > 0) {
+        *layers = made;
+    } else {
+        vshi_layers_free(made);
+    }
     return result;
 }
 
 void vshi_layers_free(vshi_layers *layers) {
     for (size_t i = 0; layers != NULL && i < layers->count; ++i) {
-        vshi_sampler_free(layers->items[i].sampler);
+        vshi_shadow_close(&layers->items[i].shadow);
+        vshi_ao_close(&layers->items[i].ao);
     }
     free(layers);
 }
 
-/* The points of a piece as a layer shades them: on their own, from 0 on. */
+/* The points of a piece for a layer, numbered from 0 on. */
 typedef struct layer_piece {
     vsh_points points;
     uint32_t texels[VSHI_PIECE];
     float value[VSHI_PIECE], deviation[VSHI_PIECE];
-    double above[VSHI_PIECE]; /* part of the light over a point's own horizon, */
-    double share[VSHI_PIECE]; /* and what of it the layer leaves */
+    double above[VSHI_PIECE]; /* part of the light above a point's own horizon */
+    double share[VSHI_PIECE]; /* share of that part that the layer leaves */
     float bent[3 * VSHI_AO_GRAIN];
 } layer_piece;
 
@@ -194,16 +154,11 @@ static void cut(layer_piece *piece, const vsh_points *points, size_t begin, size
     }
 }
 
-/* Of a smoothstep over a unit: what a deviation grows by at most. */
+/* The steepest slope of a smoothstep over a unit: a deviation grows by at most this factor. */
 static const double STEEPEST = 1.5;
 
-static double smoothstep(const double edges[2], double value) {
-    const double x = (value - edges[0]) / (edges[1] - edges[0]);
-    return x <= 0.0 ? 0.0 : x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x); /* NaN stays */
-}
-
-/* Combines a layer's share of the part of the light, or sky, that is above a point's own horizon with what
- * the point has, a share of the whole. */
+/* Combines a layer's share of the light, or sky, above a point's own horizon with the point's value, a share
+ * of the whole. */
 static void combine(int32_t how, double share, double deviation, double above, float *of_point,
                     float *deviation_of_point) {
     const double before = (double)*of_point;
@@ -221,8 +176,8 @@ static void combine(int32_t how, double share, double deviation, double above, f
     }
 }
 
-/* What a layer's field leaves of the light: values of the whole become shares of what is above the horizon,
- * which is in every layer's value. */
+/* Shades by the layer's field. Values of the whole light become shares of the light above the horizon, which
+ * every layer's value contains. */
 static void shade_field(const prepared *item, const vshi_shadow_task *task, layer_piece *piece,
                         vsh_shade_stats *stats) {
     vshi_shadow_task own = item->shadow;
@@ -243,14 +198,15 @@ static void shade_field(const prepared *item, const vshi_shadow_task *task, laye
 /* Shades by heights or spheres, which give shares. */
 static void shade_closed(const prepared *item, const vshi_shadow_task *task, size_t begin, layer_piece *piece,
                          vsh_shade_stats *stats) {
-    const vsh_layer *layer = &item->layer;
+    const vshi_layer *layer = &item->layer;
     const size_t count = piece->points.count;
     if (layer->heights != NULL) {
-        vshi_heights_shadow(layer->heights, &item->light, item->options.method, &piece->points, 0, count,
-                            vshi_heights_lift(layer->heights, layer->start_offset), piece->value, stats);
+        vshi_heights_shadow(layer->heights, &item->light, item->shadow.options.method, &piece->points, 0,
+                            count, vshi_heights_lift(layer->heights, layer->start_offset), piece->value,
+                            stats);
     } else {
-        vshi_spheres_shadow(layer->spheres, &item->light, item->options.method, &piece->points, 0, count,
-                            piece->value, stats);
+        vshi_spheres_shadow(layer->spheres, &item->light, item->shadow.options.method, &piece->points, 0,
+                            count, piece->value, stats);
     }
     for (size_t i = 0; i < count; ++i) {
         piece->above[i] = vshi_shadow_above(task, begin + i);
@@ -277,7 +233,8 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
             }
             double share = piece.share[n], deviation = (double)piece.deviation[n];
             if (remap[1] > 0.0) {
-                share = smoothstep(remap, share);
+                const double x = (share - remap[0]) / (remap[1] - remap[0]);
+                share = x <= 0.0 ? 0.0 : x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x); /* NaN stays */
                 deviation *= STEEPEST / (remap[1] - remap[0]);
             }
             combine(item->layer.combine, share, deviation, piece.above[n], &task->visibility[i],
@@ -301,14 +258,6 @@ static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin
     vshi_ao_shade(&own, 0, count, stats);
 }
 
-/* What a layer takes from the open sky is taken from what is left of it. */
-static void superpose(float *bent, const float *of_layer, const float *normal) {
-    const vshi_vec open = vshi_scale(vshi_unit(vshi_vec_off(normal)), VSHI_AO_OPEN);
-    bent[0] += of_layer[0] - (float)open.x;
-    bent[1] += of_layer[1] - (float)open.y;
-    bent[2] += of_layer[2] - (float)open.z;
-}
-
 void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
                     vsh_shade_stats *stats) {
     layer_piece piece;
@@ -318,8 +267,13 @@ void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t 
         for (size_t i = begin, n = 0; i < end; ++i, ++n) {
             combine(layers->items[k].layer.combine, (double)piece.value[n], (double)piece.deviation[n], 1.0,
                     &task->ao[i], task->deviation != NULL ? &task->deviation[i] : NULL);
-            if (task->bent != NULL) {
-                superpose(task->bent + 3 * i, piece.bent + 3 * n, task->points->normals + 3 * i);
+            if (task->bent != NULL) { /* the layer hides this part of the full sky */
+                const vshi_vec normal = vshi_unit(vshi_vec_off(task->points->normals + 3 * i));
+                float open[3];
+                vshi_vec_to_floats(vshi_scale(normal, VSHI_AO_OPEN), open);
+                for (size_t axis = 0; axis < 3; ++axis) {
+                    task->bent[3 * i + axis] += piece.bent[3 * n + axis] - open[axis];
+                }
             }
         }
     }

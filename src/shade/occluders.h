@@ -1,50 +1,121 @@
-/* What casts, as shading sees it. */
+/* Casters as shading sees them, and how many voxels pay for them. */
 #ifndef VSHI_OCCLUDERS_H
 #define VSHI_OCCLUDERS_H
 
+#include "heightfield/heights.h"
+#include "spheres/spheres.h"
+#include "trace/trace.h"
+
+#include <vdbshade/light.h>
 #include <vdbshade/occluders.h>
 
-/* Handles that are made for a caller own what they are made of; one that stands for a part of another within
- * a call (a layer's casters) is a plain struct. */
-struct vsh_occluders {
-    const vsh_field *field; /* never NULL */
-    const vsh_triangles *triangles;
-    const vsh_layer *layers; /* [layer_count]: resolved and checked */
-    size_t layer_count;
-    const vsh_triangles *true_triangles;
-    const vsh_solids *true_solids;
-    double lifted; /* what the points to be shaded are off their surfaces already, of a start offset; world
-                    * units */
-    struct vshi_occluders_own *own;
-};
+enum { VSHI_MAX_LAYERS = 128 };
 
-/* What a handle owns. It frees the members; those that are NULL are the caller's, or not there. */
+/* Casters that are shaded in their own way. A view: what it points to must outlive the occluders. */
+typedef struct vshi_layer {
+    const char *name;                /* NULL: none */
+    const vsh_field *field;          /* NULL if `heights` or `spheres` cast without AO */
+    const vshi_triangles *triangles; /* for exact methods; NULL: none */
+    const vshi_heights *heights; /* these two cast in closed form, at most one of them; AO takes the field */
+    const vshi_spheres *spheres; /* and the triangles */
+    int32_t method;              /* the rest as in vsh_scene_layer */
+    int32_t combine;
+    double softness;
+    double remap[2];
+    double start_offset;
+    const char *const *lights;
+    size_t light_count;
+    int32_t ao;
+} vshi_layer;
+
+static inline vshi_layer vshi_layer_default(void) {
+    return (vshi_layer){.method = -1, .softness = 1.0, .start_offset = -1.0, .ao = 1};
+}
+
+/* What a handle is made of. Views: nothing is owned. */
+typedef struct vshi_occluder_parts {
+    const vsh_field *field; /* casters in no layer; NULL: they are known by their triangles alone, or all
+                               casters are in layers */
+    const vshi_triangles *triangles; /* of the same casters, for exact methods; NULL: none */
+    const vshi_layer *layers;        /* [layer_count]: casters beside those */
+    size_t layer_count;              /* 0 … VSHI_MAX_LAYERS */
+    const vshi_triangles
+        *true_triangles; /* these two together are all casters, the truth that the errors of a
+                            bake are measured against; not with layers. NULL: no measuring */
+    const vshi_solids *true_solids;
+    double voxel_size; /* unit of start offsets if there is no field, world units, 1e-12 … 1e12; 0: 1/96 of
+                          the triangles' longest side, else the voxels of the finest layer, else 1e-5 of the
+                          first layer's longest side */
+} vshi_occluder_parts;
+
+/* Makes occluders of parts. The layers are copied; what they and the parts refer to must outlive the handle.
+ * Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more layers than
+ * VSHI_MAX_LAYERS; as vshi_layer_check()), VSH_ERROR_MEMORY. */
+vsh_result vshi_occluders_from_parts(const vshi_occluder_parts *parts, vsh_occluders **occluders,
+                                     vsh_error *error);
+
+/* The parts that a handle owns and frees. Other members are NULL. */
 typedef struct vshi_occluders_own {
     vsh_field *field;
-    vsh_triangles *triangles;
-    vsh_triangles *true_triangles;
-    vsh_solids *true_solids;
-    vsh_layer *layers;        /* [layer_count] */
+    vshi_triangles *triangles;
+    vshi_triangles *true_triangles;
+    vshi_solids *true_solids;
+    vshi_layer *layers;       /* [layer_count] */
     vsh_field **layer_fields; /* these two: [layer_capacity], or NULL */
-    vsh_triangles **layer_triangles;
+    vshi_triangles **layer_triangles;
     size_t layer_capacity;
-    uint64_t grid_bytes; /* that level sets took */
+    uint64_t grid_bytes; /* of the level sets, before they were freed */
     double voxelize_s, field_s, triangles_s;
 } vshi_occluders_own;
 
-/* Voxels along the longest side, of casters that are traced only, that lengths are told in. */
+/* A handle made for a caller owns its parts. A handle for a part of another within a call, such as a layer's
+ * casters, is a plain struct. */
+struct vsh_occluders {
+    const vsh_field *field; /* never NULL */
+    const vshi_triangles *triangles;
+    const vshi_layer *layers; /* [layer_count]: resolved and checked */
+    size_t layer_count;
+    const vshi_triangles *true_triangles;
+    const vshi_solids *true_solids;
+    double lifted; /* part of a start offset that the points already have, world units */
+    vshi_occluders_own own;
+};
+
+/* Voxels along the longest side that define lengths for casters without voxels. */
 enum { VSHI_TRACED_RESOLUTION = 96 };
 
-/* What stands for the field of casters that are traced only; *field is NULL where there are no triangles.
- * voxel_size 0: the box's longest side over VSHI_TRACED_RESOLUTION. Errors: as vshi_field_create_unknown(),
- * VSH_ERROR_LIMIT (voxel_size 0: the box is larger, smaller or farther from the origin than one with voxels
- * may be). */
-vsh_result vshi_occluders_unknown(const vsh_triangles *triangles, double voxel_size, vsh_field **field,
+/* Makes a field without distances for casters that are only traced. *field is NULL if there are no triangles.
+ * A voxel_size of 0 is the box's longest side over VSHI_TRACED_RESOLUTION. Errors: as
+ * vshi_field_create_unknown(), VSH_ERROR_LIMIT (voxel_size 0: the box is too large, too small or too far from
+ * the origin for voxels). */
+vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_size, vsh_field **field,
                                   vsh_error *error);
 
-/* As vsh_occluders_from_parts(), and takes over what `own` holds, which is freed also after an error. */
-vsh_result vshi_occluders_make(const vsh_occluder_parts *parts, vshi_occluders_own *own,
+/* As vshi_occluders_from_parts(). It takes over the contents of `own`, which are freed also after an error.
+ */
+vsh_result vshi_occluders_make(const vshi_occluder_parts *parts, vshi_occluders_own *own,
                                vsh_occluders **occluders, vsh_error *error);
 void vshi_occluders_own_free(vshi_occluders_own *own);
+
+/* Bytes of the fields and layers. */
+double vshi_occluders_bytes(const vsh_occluders *occluders);
+
+/* --- the number of voxels that pays */
+
+/* Casters, and the values that are computed from them. */
+typedef struct vshi_resolution_need {
+    double values;    /* shadow values, by rays against triangles: points × lights */
+    double max_error; /* of each value */
+    double triangles;
+    double area;    /* of the triangles, world units² */
+    double longest; /* side of the casters' box, world units */
+} vshi_resolution_need;
+
+/* Voxels along the longest side of traced casters, so that proofs save the most time; 0: voxels save none. */
+int32_t vshi_resolution_traced(const vshi_resolution_need *need);
+
+/* Voxels along the longest side of casters known only by voxels, so that these displace shadows, or
+ * (`ao_only`) AO, by no more than max_error. */
+int32_t vshi_resolution_marched(double max_error, int32_t ao_only);
 
 #endif

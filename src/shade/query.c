@@ -1,11 +1,11 @@
-/* Shades points in pieces: few as they come, many in the order of a curve. */
-#include <vdbshade/query.h>
+/* Queries: shades points in pieces, few points in their order, many in the order of a curve. */
+#include <vdbshade/light.h>
 
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "field/level.h"
+#include "field/field.h"
 #include "shade/layers.h"
 #include "shade/query.h"
 
@@ -34,6 +34,16 @@ static void view_position(const point_view *view, size_t i, double position[3]) 
     }
 }
 
+typedef struct query_call {
+    const vsh_query *query;
+    point_view view;
+    const float *faces; /* [points][3] or NULL, as of vshi_ao_task */
+    const vsh_query_output *output;
+    const vshi_kernel *kernel;
+    size_t first;          /* of the current points */
+    const uint64_t *order; /* order_points(), or NULL: as they come */
+} query_call;
+
 /* --- points sorted along Morton's curve. Hilbert's, which never jumps, saves a hundredth of the samples of a
  * million random points and takes 30 ns more a point to compute. */
 
@@ -49,13 +59,11 @@ enum {
 
 _Static_assert(VSH_QUERY_BATCH == 1 << SHIFT, "points are numbered by the lowest bits");
 
-/* The curve fills the casters' box, grown by so many of its diagonals; points outside are put on its sides.
- */
+/* The curve fills the casters' box, grown by this many diagonals. Points outside count as on its sides. */
 static const double FAR = 4.0;
 
 typedef struct ordering {
-    const point_view *view;
-    size_t first; /* of the points */
+    const query_call *call;
     double low[3];
     double scale; /* cells are cubes */
     uint64_t *order;
@@ -69,7 +77,7 @@ static inline uint64_t spread(uint64_t x) {
     return (x | x << 2) & 0x249249249249u;
 }
 
-static uint64_t place_of(const ordering *o, const double p[3]) {
+static uint64_t curve_place(const ordering *o, const double p[3]) {
     uint64_t place = 0;
     bool finite = true;
     for (int axis = 0; axis < 3; ++axis) {
@@ -84,13 +92,13 @@ static void make_keys(void *user, size_t begin, size_t end) {
     const ordering *o = user;
     for (size_t i = begin; i < end; ++i) {
         double p[3];
-        view_position(o->view, o->first + i, p);
-        o->order[i] = place_of(o, p) << SHIFT | i;
+        view_position(&o->call->view, o->call->first + i, p);
+        o->order[i] = curve_place(o, p) << SHIFT | i;
     }
 }
 
-/* Sorts by the places, which are above the points' numbers. The sorted numbers come to lie in `order` after
- * an even number of passes. */
+/* Sorts by the places, which are above the points' numbers. After an even number of passes the result is in
+ * `order`. */
 static void sort(uint64_t *order, uint64_t *spare, size_t count) {
     for (int shift = SHIFT; shift < SHIFT + PASSES * DIGIT; shift += DIGIT) {
         uint32_t at[1 << DIGIT] = {0}, sum = 0;
@@ -111,13 +119,14 @@ static void sort(uint64_t *order, uint64_t *spare, size_t count) {
     }
 }
 
-/* Orders points first … first + count - 1, at most VSH_QUERY_BATCH of them, on the job's threads: the lowest
- * bits of order[i], ORDER_POINT, are a point's number from `first`. Points in one place keep their order;
+/* Orders the next `count` points of a call, at most VSH_QUERY_BATCH, on the job's threads. The lowest bits of
+ * order[i], ORDER_POINT, are a point's number from the first. Points in one place keep their order, and
  * points that are not finite come last. `order` has room for twice as many. Errors: VSH_ERROR_CANCELLED,
  * VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */
-static vsh_result order_points(vshi_job *job, const vsh_field *field, const point_view *view, size_t first,
-                               size_t count, uint64_t *order, vsh_error *error) {
-    ordering o = {.view = view, .first = first, .order = order};
+static vsh_result order_points(const query_call *call, size_t count, uint64_t *order, vshi_job *job,
+                               vsh_error *error) {
+    const vsh_field *field = call->query->ao.field;
+    ordering o = {.call = call, .order = order};
     double diagonal = 0.0, longest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double side = field->world_max[axis] - field->world_min[axis];
@@ -137,23 +146,23 @@ static vsh_result order_points(vshi_job *job, const vsh_field *field, const poin
 /* --- whether it pays: a million random points on the sample asset take 0.59 µs each by cone as they come and
  * 0.38 in order, a hundred thousand 0.59 and 0.49, ten thousand 0.63 and 0.67 */
 
-/* Whether shading points first … first + count - 1 in the curve's order pays: whether those that follow each
- * other are mostly too far apart to share proofs. Looks at a few of them. */
-static bool order_pays(const vsh_field *field, const point_view *view, size_t first, size_t count) {
+/* Whether shading the next `count` points in the curve's order pays, by a few of them: most points that
+ * follow each other are too far apart to share proofs. */
+static bool order_pays(const query_call *call, size_t count) {
     enum { LEAST = 32768, TOGETHER = 16, LOOKS = 256 };
-    static const double SPREAD = 8.0; /* voxels: side of the box of so many points that share little */
+    static const double SPREAD = 8.0; /* voxels: side of the box of TOGETHER points that share little */
     if (count < LEAST) {
         return false;
     }
     size_t apart = 0;
     for (size_t look = 0; look < LOOKS; ++look) {
-        const size_t begin = first + (count - TOGETHER) / (LOOKS - 1) * look;
+        const size_t begin = call->first + (count - TOGETHER) / (LOOKS - 1) * look;
         double low[3], high[3], side = 0.0;
-        view_position(view, begin, low);
+        view_position(&call->view, begin, low);
         memcpy(high, low, sizeof high);
         for (size_t i = 1; i < TOGETHER; ++i) {
             double p[3];
-            view_position(view, begin + i, p);
+            view_position(&call->view, begin + i, p);
             for (int axis = 0; axis < 3; ++axis) {
                 low[axis] = fmin(low[axis], p[axis]);
                 high[axis] = fmax(high[axis], p[axis]);
@@ -162,67 +171,48 @@ static bool order_pays(const vsh_field *field, const point_view *view, size_t fi
         for (int axis = 0; axis < 3; ++axis) {
             side = fmax(side, high[axis] - low[axis]);
         }
-        apart += side > SPREAD * field->voxel_size;
+        apart += side > SPREAD * call->query->ao.field->voxel_size;
     }
     return apart > LOOKS / 4;
 }
 
 /* --- shading */
 
-/* Points that are shaded on the calling thread: starting others costs as much as some dozens of marches. */
+/* Fewer points are shaded on the calling thread: starting others costs some dozens of marches. */
 enum { FEW = 64 };
-
-typedef struct query_call {
-    const vsh_query *query;
-    point_view view;
-    const float *faces; /* [points][3] or NULL, as of vshi_ao_task */
-    const vsh_query_output *output;
-    const vshi_kernel *kernel;
-    size_t first;          /* of the points that are under way */
-    const uint64_t *order; /* order_points(), or NULL: as they come */
-} query_call;
 
 static inline float *array_of(float *const *arrays, size_t light) {
     return arrays != NULL ? arrays[light] : NULL;
 }
 
-/* Distances and, where not NULL, gradients of positions [count][3]. */
+/* Writes distances and, unless NULL, gradients of positions [count][3]. */
 static void measure(const query_call *call, size_t count, const double *positions, float *distances,
                     float *gradients) {
-    const vsh_field *field = call->query->ao.task.field;
+    const vsh_field *field = call->query->ao.field;
     for (size_t i = 0; i < count; ++i) {
         const vshi_vec p = vshi_to_field(field, positions + 3 * i);
         const bool finite = vshi_finite(p);
         const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
         float slope[3];
         const float h = vshi_field_lower_bound(field, at, gradients != NULL ? slope : NULL);
-        if (distances != NULL) {
-            distances[i] = finite ? (float)((double)h * field->voxel_size) : NAN;
-        }
+        distances[i] = finite ? (float)((double)h * field->voxel_size) : NAN;
         if (gradients != NULL) {
             const vshi_vec g =
                 finite ? vshi_direction_to_world(field, vshi_vec_off(slope)) : (vshi_vec){NAN, NAN, NAN};
-            gradients[3 * i] = (float)g.x;
-            gradients[3 * i + 1] = (float)g.y;
-            gradients[3 * i + 2] = (float)g.z;
+            vshi_vec_to_floats(g, gradients + 3 * i);
         }
     }
 }
 
-/* Points from anywhere, brought together. */
-typedef struct gathered {
+/* A piece of points, gathered from the caller's arrays. */
+typedef struct piece {
+    const query_call *call;
+    size_t begin, count;
     double positions[VSHI_PIECE][3];
     float normals[VSHI_PIECE][3], faces[VSHI_PIECE][3];
     uint32_t texels[VSHI_PIECE];
     float values[VSHI_PIECE], deviations[VSHI_PIECE];
     float gradients[VSHI_PIECE][3];
-} gathered;
-
-/* Numbers of the points of a piece. */
-typedef struct piece {
-    const query_call *call;
-    size_t begin, count;
-    size_t stride; /* of the output, bytes; 0: packed */
 } piece;
 
 static inline size_t number_of(const piece *p, size_t i) {
@@ -231,96 +221,95 @@ static inline size_t number_of(const piece *p, size_t i) {
 }
 
 static void scatter(const piece *p, size_t width, const float *values, float *to) {
-    const size_t stride = p->stride != 0 ? p->stride : width * sizeof *to;
+    const size_t stride = p->call->output->stride != 0 ? p->call->output->stride : width * sizeof *to;
     for (size_t i = 0; to != NULL && i < p->count; ++i) {
         memcpy((char *)to + number_of(p, i) * stride, values + width * i, width * sizeof *to);
     }
 }
 
-static void gather(const piece *p, gathered *g) {
-    enum { AHEAD = 16 }; /* what comes next, from anywhere in memory, is asked for so early */
+static void gather(piece *p) {
+    enum { AHEAD = 16 }; /* points that are prefetched, as they may lie anywhere in memory */
     const point_view *all = &p->call->view;
     for (size_t i = 0; i < p->count; ++i) {
         const size_t next = number_of(p, i + AHEAD < p->count ? i + AHEAD : i);
         const size_t point = number_of(p, i);
         __builtin_prefetch(all->positions + next * all->position_stride);
-        view_position(all, point, g->positions[i]);
+        view_position(all, point, p->positions[i]);
         if (all->normals != NULL) {
             __builtin_prefetch(all->normals + next * all->normal_stride);
-            memcpy(g->normals[i], all->normals + point * all->normal_stride, sizeof g->normals[i]);
+            memcpy(p->normals[i], all->normals + point * all->normal_stride, sizeof p->normals[i]);
         }
         if (p->call->faces != NULL) {
-            memcpy(g->faces[i], p->call->faces + 3 * point, sizeof g->faces[i]);
+            memcpy(p->faces[i], p->call->faces + 3 * point, sizeof p->faces[i]);
         }
-        g->texels[i] = (uint32_t)point;
+        p->texels[i] = (uint32_t)point;
         if (all->texels != NULL) {
-            memcpy(&g->texels[i], all->texels + point * all->texel_stride, sizeof g->texels[i]);
+            memcpy(&p->texels[i], all->texels + point * all->texel_stride, sizeof p->texels[i]);
         }
     }
 }
 
-/* Shades a piece: gathers its points, then scatters the values. */
+/* Gathers the points of a piece, shades them, and scatters the values. */
 static void shade_piece(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const query_call *call = user;
     const vsh_query_output *output = call->output;
-    const piece p = {call, begin, end - begin, output->stride};
-    gathered g;
-    gather(&p, &g);
-    const vsh_points points = {p.count, &g.positions[0][0],
-                               call->view.normals != NULL ? &g.normals[0][0] : NULL, g.texels};
+    piece p;
+    p.call = call;
+    p.begin = begin;
+    p.count = end - begin;
+    gather(&p);
+    const vsh_points points = {p.count, &p.positions[0][0],
+                               call->view.normals != NULL ? &p.normals[0][0] : NULL, p.texels};
     for (size_t l = 0; output->visibility != NULL && l < call->query->light_count; ++l) {
         if (output->visibility[l] != NULL) {
             float *deviation = array_of(output->deviation, l);
-            vshi_shadow_task task = call->query->shadow[l].task;
+            vshi_shadow_task task = call->query->shadow[l];
             task.kernel = call->kernel;
             task.points = &points;
             task.scattered = call->view.texels == NULL;
-            task.visibility = g.values;
-            task.deviation = deviation != NULL ? g.deviations : NULL;
+            task.visibility = p.values;
+            task.deviation = deviation != NULL ? p.deviations : NULL;
             vshi_shadow_shade(&task, 0, p.count, stats);
-            scatter(&p, 1, g.values, output->visibility[l]);
-            scatter(&p, 1, g.deviations, deviation);
+            scatter(&p, 1, p.values, output->visibility[l]);
+            scatter(&p, 1, p.deviations, deviation);
         }
     }
     if (output->ao != NULL) {
-        vshi_ao_task task = call->query->ao.task;
+        vshi_ao_task task = call->query->ao;
         task.kernel = call->kernel;
         task.points = &points;
-        task.faces = call->faces != NULL ? &g.faces[0][0] : NULL;
-        task.ao = g.values;
-        task.deviation = output->ao_deviation != NULL ? g.deviations : NULL;
+        task.faces = call->faces != NULL ? &p.faces[0][0] : NULL;
+        task.ao = p.values;
+        task.deviation = output->ao_deviation != NULL ? p.deviations : NULL;
         vshi_ao_shade(&task, 0, p.count, stats);
-        scatter(&p, 1, g.values, output->ao);
-        scatter(&p, 1, g.deviations, output->ao_deviation);
+        scatter(&p, 1, p.values, output->ao);
+        scatter(&p, 1, p.deviations, output->ao_deviation);
     }
     if (output->distance != NULL || output->gradient != NULL) {
-        measure(call, p.count, points.positions, g.values,
-                output->gradient != NULL ? &g.gradients[0][0] : NULL);
-        scatter(&p, 1, g.values, output->distance);
-        scatter(&p, 3, &g.gradients[0][0], output->gradient);
+        measure(call, p.count, points.positions, p.values,
+                output->gradient != NULL ? &p.gradients[0][0] : NULL);
+        scatter(&p, 1, p.values, output->distance);
+        scatter(&p, 3, &p.gradients[0][0], output->gradient);
     }
 }
 
-/* VSH_QUERY_BATCH points at a time, so that calls for so many each give the same bits. */
+/* Shades VSH_QUERY_BATCH points at a time, so that calls for as many each give the same bits. */
 static vsh_result shade_many(query_call *call, const vsh_run *run, vshi_job *job, vsh_shade_stats *stats,
                              vsh_error *error) {
-    const vsh_field *field = call->query->ao.task.field;
-    const size_t count = call->view.count;
-    const size_t most = count < VSH_QUERY_BATCH ? count : VSH_QUERY_BATCH;
+    const size_t count = call->view.count, most = count < VSH_QUERY_BATCH ? count : VSH_QUERY_BATCH;
+    const double bytes = vshi_field_bytes(call->query->ao.field) + (double)most * 2.0 * sizeof(uint64_t);
     uint64_t *order = NULL;
     vsh_result result = VSH_OK;
     for (; call->first < count; call->first += most) {
-        const size_t left = count - call->first;
-        const size_t now = left < most ? left : most;
-        const bool ordered = order_pays(field, &call->view, call->first, now);
+        const size_t left = count - call->first, now = left < most ? left : most;
         call->order = NULL;
-        if (ordered && order == NULL) {
-            VSHI_TRY_DONE(vshi_check_limit(run, vshi_field_bytes(field) + (double)most * 2.0 * sizeof *order,
-                                           "query", error));
-            VSHI_TRY_DONE(vshi_allocate((void **)&order, most, 2 * sizeof *order, "order of points", error));
-        }
-        if (ordered) {
-            VSHI_TRY_DONE(order_points(job, field, &call->view, call->first, now, order, error));
+        if (order_pays(call, now)) {
+            if (order == NULL) {
+                VSHI_TRY_DONE(vshi_check_limit(run, bytes, "query", error));
+                VSHI_TRY_DONE(
+                    vshi_allocate((void **)&order, most, 2 * sizeof *order, "order of points", error));
+            }
+            VSHI_TRY_DONE(order_points(call, now, order, job, error));
             call->order = order;
         }
         VSHI_TRY_DONE(vshi_shade_pieces(job, now, VSHI_PIECE, shade_piece, call, stats, error));
@@ -330,7 +319,7 @@ done:
     return result;
 }
 
-/* Whether anything is asked for. Errors: VSH_ERROR_ARGUMENT. */
+/* Checks the output. *any: some array is not NULL. Errors: VSH_ERROR_ARGUMENT. */
 static vsh_result check_output(const vsh_query *query, const point_view *view, const vsh_query_output *output,
                                bool *any, vsh_error *error) {
     *any = output->ao != NULL || output->distance != NULL || output->gradient != NULL;
@@ -345,7 +334,7 @@ static vsh_result check_output(const vsh_query *query, const point_view *view, c
     if (output->ao == NULL && output->ao_deviation != NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: ao_deviation without ao");
     }
-    if ((output->distance != NULL || output->gradient != NULL) && query->ao.task.field->unknown) {
+    if ((output->distance != NULL || output->gradient != NULL) && query->ao.field->unknown) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "output: distance or gradient, of occluders without voxels, which have them");
     }
@@ -354,12 +343,13 @@ static vsh_result check_output(const vsh_query *query, const point_view *view, c
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: stride %zu: expected 0 or bytes, %zu, %zu …",
                          output->stride, least, least + sizeof(float));
     }
-    return output->ao != NULL && view->normals == NULL && !query->ao.task.sphere
-               ? vshi_ao_check_points(&(vsh_points){.count = view->count}, error)
-               : VSH_OK;
+    if (output->ao != NULL && view->normals == NULL && view->count > 0 && !query->ao.sphere) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "AO needs normals: vsh_points.normals is NULL");
+    }
+    return VSH_OK;
 }
 
-/* 0 becomes `packed`. Errors: VSH_ERROR_ARGUMENT. */
+/* Replaces a stride of 0 by `packed`. Errors: VSH_ERROR_ARGUMENT. */
 static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, size_t *stride,
                                  vsh_error *error) {
     if (*stride != 0 && (*stride < packed || *stride % unit != 0)) {
@@ -370,7 +360,7 @@ static vsh_result resolve_stride(const char *name, size_t unit, size_t packed, s
     return VSH_OK;
 }
 
-/* Points as they stand in memory. Errors: VSH_ERROR_ARGUMENT. */
+/* Describes the caller's arrays. Errors: VSH_ERROR_ARGUMENT. */
 static vsh_result view_points(const vsh_points *points, const vsh_point_layout *layout, point_view *view,
                               const float **faces, vsh_error *error) {
     vsh_point_layout l = vsh_point_layout_default();
@@ -424,10 +414,8 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
         shade_piece(&call, 0, view.count, stats != NULL ? stats : &own);
         return VSH_OK;
     }
-    vshi_job *job = vshi_job_begin(&full_run, "query", view.count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "query: the system refused memory");
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(&full_run, "query", view.count, &job, error));
     const vsh_result result = shade_many(&call, &full_run, job, stats, error);
     vshi_job_end(job);
     return result;
@@ -496,7 +484,7 @@ vsh_result vshi_query_create(const vsh_occluders *occluders, const vsh_light *li
 void vshi_query_prove(const vsh_query *query, int32_t isa, size_t light, size_t count,
                       const double (*centre)[3], const double *radius, int8_t *proof,
                       vsh_shade_stats *stats) {
-    vshi_shadow_task task = query->shadow[light].task;
+    vshi_shadow_task task = query->shadow[light];
     task.kernel = vshi_kernel_of(isa);
     vshi_vec at[VSHI_QUERY_BALLS];
     double voxels[VSHI_QUERY_BALLS];

@@ -1,58 +1,42 @@
-#include "shade/rays.h"
+/* Chunks of cones on their way to the kernel, and the errors of rays. */
+#include "shade/shade.h"
+
+#include "base/job.h"
 
 #include <math.h>
 
-/* Rays begin half a voxel on, where h / t starts to mean something: the field itself is not known better. */
+/* Rays begin half a voxel on. The field is not known better, so h / t means nothing before. */
 static const double FIRST_STEP = 0.0625;
-/* Cones no longer than this, voxels, are marched as they are: clipping them costs more than it saves. */
+/* Clipping cones shorter than this, voxels, costs more than it saves. */
 static const double SHORT = 32.0;
-/* Cones that are wider than the reach by no more than this part are not counted as beyond it: the least that
- * their closeness can then read, 1 / 1.03, is 0.997 of the light seen where all of it is. Nor do their last
- * voxels count: a field that reaches as its scene asks for ends at the farthest corner of casters and
- * receivers, and marches begin and end a few voxels outside. */
+/* Cones wider than the reach by no more than this part do not count as beyond it. Their closeness reads at
+ * least 1 / 1.03, which is 0.997 of the light instead of 1. Their last voxels do not count either. A field
+ * reaches the farthest corner of casters and receivers, and marches begin and end a few voxels outside. */
 static const double BEYOND = 0.03;
 static const double LAST_STRETCH = 4.0;
 /* The bounds are those of lattice points next to the surface; half a voxel covers the float rounding. */
 static const double BOUNDS_MARGIN = 0.5;
 
-void vshi_chunk_clear(vshi_chunk *chunk) {
-    float *lane[VSHI_RAY_FLOATS];
-    for (int i = 0; i < VSHI_RAY_FLOATS; ++i) {
-        lane[i] = chunk->memory[i];
-    }
-    chunk->rays = (vshi_rays){.count = 0,
-                              .origin = {lane[0], lane[1], lane[2]},
-                              .direction = {lane[3], lane[4], lane[5]},
-                              .begin = lane[6],
-                              .end = lane[7],
-                              .sine = lane[8],
-                              .stop = lane[9],
-                              .close = lane[10],
-                              .horizon = lane[11],
-                              .wide = lane[12],
-                              .clear = lane[13],
-                              .deeper = lane[14],
-                              .pace = lane[11], /* no march takes both horizons and a pace */
-                              .proof = chunk->proof};
+const vshi_kernel *vshi_kernel_of(int32_t isa) {
+    return VSHI_KERNEL_OF(vshi_kernel, isa);
 }
 
-void vshi_chunk_push(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner) {
-    const size_t i = chunk->rays.count++;
-    const vshi_rays *rays = &chunk->rays;
-    rays->origin[0][i] = (float)cone->origin.x;
-    rays->origin[1][i] = (float)cone->origin.y;
-    rays->origin[2][i] = (float)cone->origin.z;
-    rays->direction[0][i] = (float)cone->direction.x;
-    rays->direction[1][i] = (float)cone->direction.y;
-    rays->direction[2][i] = (float)cone->direction.z;
-    rays->begin[i] = (float)cone->begin;
-    rays->end[i] = (float)cone->end;
-    rays->sine[i] = (float)cone->sine;
-    rays->stop[i] = (float)cone->stop;
-    rays->close[i] = (float)cone->close;
-    rays->horizon[i] = (float)cone->horizon;
-    rays->wide[i] = (float)cone->wide;
-    rays->deeper[i] = (float)cone->deeper;
+static void push_cone(vshi_chunk *chunk, const vshi_cone *cone, uint32_t owner) {
+    const size_t i = chunk->count++;
+    chunk->origin[0][i] = (float)cone->origin.x;
+    chunk->origin[1][i] = (float)cone->origin.y;
+    chunk->origin[2][i] = (float)cone->origin.z;
+    chunk->direction[0][i] = (float)cone->direction.x;
+    chunk->direction[1][i] = (float)cone->direction.y;
+    chunk->direction[2][i] = (float)cone->direction.z;
+    chunk->begin[i] = (float)cone->begin;
+    chunk->end[i] = (float)cone->end;
+    chunk->sine[i] = (float)cone->sine;
+    chunk->stop[i] = (float)cone->stop;
+    chunk->close[i] = (float)cone->close;
+    chunk->horizon[i] = (float)cone->horizon;
+    chunk->wide[i] = (float)cone->wide;
+    chunk->deeper[i] = (float)cone->deeper;
     chunk->owner[i] = owner;
 }
 
@@ -69,8 +53,8 @@ static void clip_to_bounds(const vsh_field *field, const vshi_cone *cone, double
     const double o[3] = {cone->origin.x, cone->origin.y, cone->origin.z};
     const double d[3] = {cone->direction.x, cone->direction.y, cone->direction.z};
     const double margin = BOUNDS_MARGIN + cone->wide;
-    /* a point r away and f off the axis comes closest, by h / t, at t = r / cos f: later minima are not the
-     * cone's */
+    /* A point at distance r, at an angle f off the axis, is closest by h / t at t = r / cos f. Later minima
+     * are not the cone's. */
     double farthest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double low = fabs(o[axis] - (double)field->bounds_min[axis]);
@@ -80,14 +64,14 @@ static void clip_to_bounds(const vsh_field *field, const vshi_cone *cone, double
     }
     const double last = sqrt(farthest / (1.0 - cone->sine * cone->sine)) + margin;
     *end = last < *end ? last : *end;
-    /* a ball of radius t sin b can meet the box only while its centre is within that of each side */
+    /* a ball of radius t sin b can meet the box only while its centre is that close to each side */
     for (int axis = 0; axis < 3; ++axis) {
         clip(d[axis] + cone->sine, (double)field->bounds_min[axis] - margin - o[axis], begin, end);
         clip(cone->sine - d[axis], o[axis] - (double)field->bounds_max[axis] - margin, begin, end);
     }
 }
 
-/* Whether a cone begins where bounds do not make it begin later. */
+/* Whether a cone begins inside the bounds, so that they do not delay its begin. */
 static bool within_bounds(const vsh_field *field, const vshi_cone *cone) {
     const double o[3] = {cone->origin.x, cone->origin.y, cone->origin.z};
     const double margin = BOUNDS_MARGIN + cone->wide;
@@ -105,7 +89,7 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
     if (!(begin < end)) {
         return false;
     }
-    /* what was proved of a cone does not change where it begins, or values would tell its neighbours */
+    /* A proof must not change where a cone begins. Otherwise values would depend on the neighbours. */
     if (end > SHORT || (cone->whole > SHORT && !within_bounds(field, cone))) {
         clip_to_bounds(field, cone, &begin, &end);
         if (!(begin < end)) {
@@ -113,14 +97,14 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
         }
     }
     if (field->unknown) {
-        return true; /* that it passes by the casters' box is all that a march would prove */
+        return true; /* a march would prove no more than that it misses the casters' box */
     }
-    vshi_chunk_push(chunk, cone, owner);
-    chunk->rays.begin[chunk->rays.count - 1] = (float)begin;
-    chunk->rays.end[chunk->rays.count - 1] = (float)end;
+    push_cone(chunk, cone, owner);
+    chunk->begin[chunk->count - 1] = (float)begin;
+    chunk->end[chunk->count - 1] = (float)end;
     ++stats->marches;
     const double band = field->levels[field->level_count - 1].band;
-    /* beams that are wider than their cones say nothing of these */
+    /* beams that are wider than their cones say nothing about these */
     if (!(cone->deeper > 0.0) && cone->sine * (end - LAST_STRETCH) > (1.0 + BEYOND) * band) {
         ++stats->beyond_reach;
     }
@@ -130,12 +114,12 @@ bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *
 void vshi_chunk_march(vshi_chunk *chunk, const vshi_kernel *kernel, const vsh_field *field, int32_t kind,
                       int32_t max_steps, vsh_shade_stats *stats) {
     vshi_march_stats work = {0, 0};
-    kernel->march(field, &chunk->rays, kind, max_steps, &work);
+    kernel->march(field, chunk, kind, max_steps, &work);
     stats->samples += work.samples;
     stats->unfinished += kind == VSHI_MARCH_PROOF || kind == VSHI_MARCH_BEAM ? 0 : work.unfinished;
 }
 
-/* asin by its series for |z| ≤ 1/2, where 14 terms leave 1e-11. */
+/* The series of asin for |z| ≤ 1/2. 14 terms leave 1e-11. */
 static double asin_small(double z) {
     const double square = z * z;
     double term = z, sum = z;
@@ -146,7 +130,9 @@ static double asin_small(double z) {
     return sum;
 }
 
-double vshi_segment(double x) {
+/* Fraction of a disc light that is seen past a straight edge at x of its radius from the centre, for x in
+ * [-1, 1]: the circular segment 1/2 + (x √(1 - x²) + asin x) / π. It uses no libm, whose bits differ. */
+static double segment_share(double x) {
     static const double PI = 3.14159265358979323846;
     if (!(x > -1.0)) {
         return 0.0;
@@ -167,19 +153,19 @@ double vshi_cone_visibility(double closeness, double sine) {
     if (closeness <= -sine) {
         return 0.0;
     }
-    return vshi_segment(closeness / sine * sqrt((1.0 - sine * sine) / (1.0 - closeness * closeness)));
+    return segment_share(closeness / sine * sqrt((1.0 - sine * sine) / (1.0 - closeness * closeness)));
 }
 
 /* --- errors of a point's rays, by how many were lit and by the rays of the points around it */
 
-/* Variances that an edge through the middle of the disc leaves, of n^-3/2 and n^-1: see vshi_rays_error().
+/* Variances of an edge through the middle of the disc, in units of n^-3/2 and n^-1: see vshi_rays_error().
  * UNSEEN is the variance of a part that no ray has met, over the square of its expected size. A geometric
  * distribution has 2. */
 static const double SOBOL = 0.2, BLUE = 0.12, UNSEEN = 1.5;
 
 double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected) {
-    /* the share is smoothed by a ray of the expected share (Jeffreys' prior where that is a half), so that a
-     * few rays that agree prove nothing */
+    /* Smoothed by one ray of the expected share (Jeffreys' prior for a half), so that a few agreeing rays
+     * prove nothing. */
     const double n = taken, p = (lit + expected) / (n + 1.0);
     const double root = sqrt(n);
     const double white = 1.0 / root, low = 1.0 / (root * sqrt(root));
@@ -190,22 +176,18 @@ double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double e
     return spread * sqrt(p * (1.0 - p));
 }
 
-/* A power a little less than a third, by roots, which have the same bits everywhere. */
-static double third_of(double x) {
-    const double fourth = sqrt(sqrt(x));
-    return fourth * sqrt(sqrt(fourth));
-}
-
 double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_around, double taken_around) {
     const double n = taken;
     const int32_t fewer = lit < taken - lit ? lit : taken - lit;
     const double around = fewer == lit ? lit_around : taken_around - lit_around;
-    /* the lesser part, expected as large as around the point, smoothed by Laplace's rule of succession */
+    /* the smaller part, expected as large as around the point, smoothed by Laplace's rule of succession */
     const double p = fmin(0.5, (fewer + 1.0) / (n + (taken_around + 2.0) / (around + 1.0)));
     if (fewer == 0) {
         return sqrt(UNSEEN) * p;
     }
-    const double white = p * (1.0 - p) / n, edge = third_of(4.0 * p * (1.0 - p));
+    /* a power a little below a third, by roots, which have the same bits everywhere */
+    const double white = p * (1.0 - p) / n, fourth = sqrt(sqrt(4.0 * p * (1.0 - p)));
+    const double edge = fourth * sqrt(sqrt(fourth));
     const double even = sampler == VSH_SAMPLER_SOBOL  ? SOBOL * edge / (n * sqrt(n))
                         : sampler == VSH_SAMPLER_BLUE ? BLUE * edge * edge / n
                                                       : white;

@@ -1,20 +1,64 @@
+/* Options, statistics, origins and lifts of rays, irradiance. */
 #include "shade/shade.h"
 
+#include "base/elementary.h"
+#include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "field/surface.h"
+#include "field/field.h"
+#include "field/level.h"
+#include "method/method.h"
+#include "shade/layers.h"
+#include "trace/embree.h"
 
 #include <math.h>
 #include <pthread.h>
+
+size_t vshi_find_group(const size_t *first, size_t count, size_t element) {
+    size_t low = 0, high = count;
+    while (high - low > 1) {
+        const size_t middle = low + (high - low) / 2;
+        if (first[middle] <= element) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return low;
+}
+
+vsh_result vshi_begin_stage(const vsh_run *run, const char *stage, size_t total, vshi_job **job,
+                            vsh_error *error) {
+    *job = vshi_job_begin(run, stage, total);
+    return *job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
+}
+
+vsh_result vshi_run_stage(const vsh_run *run, const char *stage, size_t count, vshi_element_fn *fn,
+                          void *user, vsh_error *error) {
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(run, stage, count, &job, error));
+    const vsh_result result = vshi_parallel_each(job, count, 1, 1, fn, user, error);
+    vshi_job_end(job);
+    return result;
+}
+
+vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *error) {
+    for (const vshi_range *r = ranges; r < ranges + count; ++r) {
+        if (!(r->value >= r->low && r->value <= r->high)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", r->name, r->value,
+                             r->low, r->high);
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- options and statistics */
 
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error) {
     *full = vsh_shade_options_default();
     VSHI_TRY(vshi_options_resolve(options, full, sizeof *full, "vsh_shade_options", error));
-    const struct {
-        const char *name;
-        double value, low, high;
-    } fields[] = {
+    const vshi_range ranges[] = {
         {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_AUTO},
         {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_AUTO},
         {"ao_cones", full->ao_cones, 1, 256},
@@ -32,19 +76,13 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
         {"ao_up[1]", full->ao_up[1], -0x1p500, 0x1p500},
         {"ao_up[2]", full->ao_up[2], -0x1p500, 0x1p500},
     };
-    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
-        if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", fields[i].name,
-                             fields[i].value, fields[i].low, fields[i].high);
-        }
-    }
-    return VSH_OK;
+    return vshi_check_ranges(ranges, sizeof ranges / sizeof ranges[0], error);
 }
 
-void vshi_shade_options_settle(vsh_shade_options *full, const vsh_triangles *triangles) {
+void vshi_shade_options_settle(vsh_shade_options *full, const vshi_triangles *triangles) {
     const int32_t has_triangles = triangles != NULL;
-    full->method = vsh_shadow_method_resolve(full->method, has_triangles);
-    full->ao_method = vsh_ao_method_resolve(full->ao_method, has_triangles);
+    full->method = vshi_shadow_method_resolve(full->method, has_triangles);
+    full->ao_method = vshi_ao_method_resolve(full->ao_method, has_triangles);
     const bool fixed = full->method == VSH_SHADOW_RAYS || full->ao_method == VSH_AO_RAYS;
     if (full->sampler == VSH_SAMPLER_BLUE && full->max_error < VSHI_COARSE && !fixed) {
         full->sampler = VSH_SAMPLER_SOBOL;
@@ -68,13 +106,6 @@ int32_t vshi_shade_most_rays(const vsh_shade_options *options, vshi_spread_fn *s
     return rays;
 }
 
-vsh_result vshi_shade_sampler(const vsh_shade_options *options, int32_t rays, const char *what,
-                              vshi_sampler **sampler, vsh_error *error) {
-    *sampler = vshi_sampler_create(options->sampler, rays, options->frame);
-    return *sampler != NULL ? VSH_OK
-                            : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-}
-
 void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
     stats->marches += more->marches;
     stats->samples += more->samples;
@@ -90,8 +121,7 @@ void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more) {
     stats->worst_error = fmax(stats->worst_error, more->worst_error);
 }
 
-/* Pieces of points at work. Squared errors are added up in whole units of VSHI_SQUARE_UNIT, so that the order
- * of threads changes no bit. */
+/* Pieces of points at work. */
 typedef struct shade_run {
     vshi_shade_fn *fn;
     const void *task;
@@ -126,14 +156,14 @@ vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_sha
 
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
                           vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error) {
-    vshi_job *job = vshi_job_begin(run, stage, count);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", stage);
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(run, stage, count, &job, error));
     const vsh_result result = vshi_shade_pieces(job, count, grain, fn, task, stats, error);
     vshi_job_end(job);
     return result;
 }
+
+/* --- where rays begin */
 
 bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
                        vshi_vec *origin, vshi_vec *normal) {
@@ -149,17 +179,163 @@ bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t 
     return vshi_finite(*origin);
 }
 
-/* Of the height of the start at most, so that a receiver never hides itself: what is left of a start offset
- * is 0.1 voxels. */
+/* Share of the origin's height by which casters may grow, so that a receiver never hides itself. A start
+ * offset keeps 0.1 voxels. */
 static const double GROWN_SHARE = 0.75;
 
 double vshi_shade_grown(const vsh_field *field, vshi_vec origin) {
-    const float at[3] = {(float)origin.x, (float)origin.y, (float)origin.z};
-    const double most = GROWN_SHARE * (double)vshi_field_distance(field, at);
+    const double most = GROWN_SHARE * vshi_distance_at(field, origin);
     return most > field->grown ? field->grown : most > 0.0 ? most : 0.0;
 }
 
 bool vshi_shade_traces(const vsh_field *field, vshi_vec origin) {
     return field->surface != NULL && vshi_shade_grown(field, origin) >= field->grown &&
            vshi_surface_clears(field, origin);
+}
+
+/* Rays to neighbours begin this far above the triangle, in units of vshi_triangles_lift(): more than the
+ * rounding of floats. */
+static const double START = 0.125;
+
+/* A neighbour at this distance or farther leaves the lift as it is; a closer one reduces it in proportion. In
+ * units of the lift: with less than 2 a sample may end up inside its neighbour or above a low one. */
+static const double ROOM = 4.0;
+
+/* Sine of the elevation of the light's lowest point above the triangle, 3 degrees. From here on a sample is
+ * not lifted: a lift also moves all other shadows. Below, the lift fades in. */
+static const double WELL_ABOVE = 0.05;
+
+vshi_lifter vshi_lifter_open(const vsh_occluders *occluders, const vsh_light *light) {
+    vshi_lifter lifter = {.occluders = occluders, .light = light};
+    if (light != NULL) {
+        lifter.place = vshi_light_in_world(light);
+    }
+    return lifter;
+}
+
+/* Sines of the elevation of the light's lowest and highest point. */
+typedef struct elevation {
+    double lowest, highest;
+} elevation;
+
+static elevation find_elevation(const vshi_lifter *l, vshi_vec from, vshi_vec normal) {
+    const vshi_light_place *place = &l->place;
+    double centre = 0.0, half = 1.0; /* in the middle of the light */
+    if (place->parallel) {
+        centre = vshi_dot(normal, place->towards);
+        half = place->sine;
+    } else {
+        const vshi_vec to = vshi_sub(place->centre, from);
+        const double distance = vshi_length(to);
+        if (distance > 0.0) {
+            centre = vshi_dot(normal, to) / distance;
+            half = place->radius / distance;
+        }
+    }
+    return (elevation){centre - half, centre + half};
+}
+
+bool vshi_light_is_cut(const vshi_lifter *lifter, const vshi_lift_point *point) {
+    return lifter->light != NULL && find_elevation(lifter, point->foot, point->face).lowest < 0.0;
+}
+
+/* Distance to the nearest triangle straight up and at 45 degrees to four sides, at most `far`. */
+static double find_room(const vshi_triangles *triangles, vshi_vec foot, vshi_vec normal, vshi_vec up,
+                        double far) {
+    const vshi_vec from = vshi_add(foot, vshi_scale(normal, START * vshi_triangles_lift(triangles)));
+    vshi_vec u, v;
+    vshi_frame(up, &u, &v);
+    const vshi_vec ways[5] = {up, vshi_unit(vshi_add(up, u)), vshi_unit(vshi_sub(up, u)),
+                              vshi_unit(vshi_add(up, v)), vshi_unit(vshi_sub(up, v))};
+    double room = far;
+    for (int k = 0; k < 5; ++k) {
+        const vshi_vec d = ways[k];
+        const vshi_segment_ray ray = {{from.x, from.y, from.z}, {d.x, d.y, d.z}, room};
+        room = fmin(room, vshi_triangles_distance(triangles, &ray));
+    }
+    return room;
+}
+
+vshi_vec vshi_lift_find(const vshi_lifter *l, const vshi_lift_point *point) {
+    static const vshi_vec NONE = {0.0, 0.0, 0.0};
+    const double length = vshi_length(point->lift);
+    if (l->light == NULL || !(length > 0.0)) {
+        return NONE;
+    }
+    if (find_elevation(l, point->foot, point->normal).highest < 0.0) {
+        return NONE; /* the smooth surface faces away from all of the light */
+    }
+    const double lowest = find_elevation(l, point->foot, point->face).lowest;
+    double share = lowest <= 0.0 ? 1.0 : fmax(1.0 - lowest / WELL_ABOVE, 0.0);
+    const vshi_vec up = vshi_scale(point->lift, 1.0 / length);
+    for (size_t k = 0; share > 0.0 && k <= l->occluders->layer_count; ++k) {
+        const vshi_triangles *triangles =
+            k == 0 ? l->occluders->triangles : l->occluders->layers[k - 1].triangles;
+        if (triangles != NULL) {
+            share *= find_room(triangles, point->foot, point->face, up, ROOM * length) / (ROOM * length);
+        }
+    }
+    return vshi_scale(point->lift, share);
+}
+
+/* --- irradiance: what the shadow value leaves out */
+
+static void tint_one(const vsh_tint *tint, double v, double rgb[3]) {
+    rgb[0] = rgb[1] = rgb[2] = v;
+    if (tint->type == VSH_TINT_QUADRATIC) {
+        rgb[1] = 0.5 * v * (v + 1.0);
+        rgb[2] = v * v;
+    } else if (tint->type == VSH_TINT_POWER) {
+        for (int c = 0; c < 3; ++c) {
+            rgb[c] = v > 0.0 ? vshi_pow(v, tint->power[c]) : v;
+        }
+    }
+}
+
+vsh_result vshi_tint_check(const vsh_tint *tint, vsh_error *error) {
+    VSHI_NEEDS(tint);
+    const vshi_range ranges[] = {
+        {"tint: type", tint->type, VSH_TINT_NONE, VSH_TINT_POWER},
+        {"tint: power[0]", tint->power[0], 0.0625, 16.0},
+        {"tint: power[1]", tint->power[1], 0.0625, 16.0},
+        {"tint: power[2]", tint->power[2], 0.0625, 16.0},
+    };
+    return vshi_check_ranges(ranges, tint->type == VSH_TINT_POWER ? 4 : 1, error);
+}
+
+void vshi_shade_tint(size_t count, const float *visibility, const vsh_tint *tint, float *rgb) {
+    VSHI_FLOATS;
+    for (size_t i = 0; i < count; ++i) {
+        double tinted[3];
+        tint_one(tint, (double)visibility[i], tinted);
+        for (size_t c = 0; c < 3; ++c) {
+            rgb[3 * i + c] = (float)tinted[c];
+        }
+    }
+}
+
+void vsh_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,
+                          const float *visibility, float *irradiance) {
+    static const vsh_tint none = {VSH_TINT_NONE, {1.0, 1.0, 1.0}};
+    vshi_shade_irradiance(points, shading_normals, light, visibility, &none, irradiance);
+}
+
+void vshi_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,
+                           const float *visibility, const vsh_tint *tint, float *irradiance) {
+    VSHI_FLOATS;
+    const float *normals = shading_normals != NULL ? shading_normals : points->normals;
+    const vshi_light_place place = vshi_light_in_world(light);
+    for (size_t i = 0; i < points->count; ++i) {
+        double tinted[3];
+        tint_one(tint, (double)visibility[i], tinted);
+        vshi_vec to;
+        const double distance = vshi_light_towards(&place, vshi_vec_of(points->positions + 3 * i), &to);
+        const double gain = vshi_light_gain(light, to, distance) *
+                            fmax(0.0, vshi_dot(vshi_unit(vshi_vec_off(normals + 3 * i)), to));
+        if (gain * tinted[0] > 0.0) {
+            for (size_t c = 0; c < 3; ++c) {
+                irradiance[3 * i + c] += (float)(tinted[c] * gain * light->color[c]);
+            }
+        }
+    }
 }

@@ -1,78 +1,214 @@
-/* What shadow and AO share: checking options, running points in chunks, adding up their work. */
+/* Options, statistics, origins of rays, chunks of cones and errors of rays, for shadow and AO. */
 #ifndef VSHI_SHADE_H
 #define VSHI_SHADE_H
 
-#include "base/job.h"
+#include "base/parallel.h"
+#include "light/light.h"
+#include "shade/kernel/march.h"
 #include "shade/occluders.h"
-#include "shade/rays.h"
 #include "trace/sampler.h"
+
+#include <vdbshade/light.h>
+
+/* --- small helpers */
+
+static inline void vshi_vec_to_floats(vshi_vec v, float to[3]) {
+    to[0] = (float)v.x;
+    to[1] = (float)v.y;
+    to[2] = (float)v.z;
+}
+
+static inline void vshi_vec_to_doubles(vshi_vec v, double to[3]) {
+    to[0] = v.x;
+    to[1] = v.y;
+    to[2] = v.z;
+}
+
+/* Signed distance at a point of field space, voxels. */
+static inline double vshi_distance_at(const vsh_field *field, vshi_vec p) {
+    const float at[3] = {(float)p.x, (float)p.y, (float)p.z};
+    return (double)vshi_field_distance(field, at);
+}
+
+/* Unit normal and direction in field space. */
+static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec direction) {
+    return vshi_unit(vshi_transform_vector(field->to_field, direction));
+}
+
+/* The group that holds an element. Groups follow each other: first[count + 1] are their first elements. */
+size_t vshi_find_group(const size_t *first, size_t count, size_t element);
+
+/* Begins a job of `total` units. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_begin_stage(const vsh_run *run, const char *stage, size_t total, vshi_job **job,
+                            vsh_error *error);
+
+/* Runs fn for each of `count` elements, one at a time, as a job of its own. Errors: those of fn,
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED, VSH_ERROR_INTERNAL. */
+vsh_result vshi_run_stage(const vsh_run *run, const char *stage, size_t count, vshi_element_fn *fn,
+                          void *user, vsh_error *error);
+
+/* A number that must lie in a range. */
+typedef struct vshi_range {
+    const char *name;
+    double value, low, high;
+} vshi_range;
+
+/* Errors: VSH_ERROR_ARGUMENT, naming the number, its value and its range. */
+vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *error);
+
+/* --- options and statistics */
+
+/* Tinted visibility, linear RGB, into rgb[count][3]; NaN stays. The tint must have passed vshi_tint_check().
+ * Runs on the calling thread. */
+void vshi_shade_tint(size_t count, const float *visibility, const vsh_tint *tint, float *rgb);
+
+/* Errors: VSH_ERROR_ARGUMENT (a type or a power out of range). */
+vsh_result vshi_tint_check(const vsh_tint *tint, vsh_error *error);
 
 /* Resolves and checks options. Errors: VSH_ERROR_ARGUMENT, naming field, value and limit. */
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,
                                       vsh_error *error);
 
-/* Errors from here on are kept with few rays, whose estimates of their own error are rough. */
+/* Smallest error that a few rays keep. Their estimates of their own error are rough. */
 #define VSHI_COARSE 0.02
 
-/* Makes of auto what it comes to with `triangles` (NULL: none), and of blue noise Sobol's sequence where
- * methods are to keep a smaller error than VSHI_COARSE: blue noise is for grain, which then nobody sees, and
- * converges as slowly as white. Layers, which have their own, take theirs from options that are not settled
- * yet. */
-void vshi_shade_options_settle(vsh_shade_options *full, const vsh_triangles *triangles);
+/* Resolves auto with `triangles` (NULL: none). Replaces blue noise by Sobol's sequence if methods keep a
+ * smaller error than VSHI_COARSE: such values show no grain, and blue noise converges as slowly as white.
+ * Layers settle the options for their own triangles. */
+void vshi_shade_options_settle(vsh_shade_options *full, const vshi_triangles *triangles);
 
-/* Standard error of a value near a half by so many rays of a VSH_SAMPLER_…. */
+/* Standard error of a value near a half by a number of rays. */
 typedef double vshi_spread_fn(int32_t sampler, int32_t rays);
 
-/* The most rays that a value takes: what the options say, or what it takes for max_error, or a number for
- * methods that keep none. */
+/* The largest number of rays of a value: as the options say, or for max_error, or a fixed number for methods
+ * that keep no error. */
 int32_t vshi_shade_most_rays(const vsh_shade_options *options, vshi_spread_fn *spread, bool keeps_error);
 
-/* Squared errors are added up in units of it, so that the order of threads and bands changes no bit. */
+/* Squared errors are summed in whole units, so that the order of threads changes no bit. */
 #define VSHI_SQUARE_UNIT 0x1p-40
 
-/* Shades points begin … end - 1; adds what it did to *stats. */
-typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
-
-/* Adds what `more` counts. */
+/* Adds the statistics of `more`. */
 void vshi_shade_stats_add(vsh_shade_stats *stats, const vsh_shade_stats *more);
 
-/* The sampler of methods by rays, of so many at most, for `what`. */
-vsh_result vshi_shade_sampler(const vsh_shade_options *options, int32_t rays, const char *what,
-                              vshi_sampler **sampler, vsh_error *error);
+/* Shades points begin … end - 1, and adds its work to *stats. */
+typedef void vshi_shade_fn(const void *task, size_t begin, size_t end, vsh_shade_stats *stats);
 
 /* Runs fn over `count` points in pieces of `grain`, as a part of a job whose units are points. */
 vsh_result vshi_shade_pieces(vshi_job *job, size_t count, size_t grain, vshi_shade_fn *fn, const void *task,
                              vsh_shade_stats *stats, vsh_error *error);
 
-/* A value's estimated error. */
-static inline void vshi_stats_add_error(vsh_shade_stats *stats, double error) {
-    stats->square_error += error * error;
-    stats->worst_error = error > stats->worst_error ? error : stats->worst_error;
-}
-
-/* The same as a job of its own, under progress stage `stage`. `run` is a resolved one. */
+/* Runs fn as a job of its own. `run` is resolved. */
 vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, size_t grain,
                           vshi_shade_fn *fn, const void *task, vsh_shade_stats *stats, vsh_error *error);
 
-/* vsh_shade_irradiance() by a tinted visibility; the tint is one that vsh_tint_check() has passed. */
+/* vsh_shade_irradiance() with tinted visibility. The tint must have passed vshi_tint_check(). */
 void vshi_shade_irradiance(const vsh_points *points, const float *shading_normals, const vsh_light *light,
                            const float *visibility, const vsh_tint *tint, float *irradiance);
 
-/* How far above a point its rays begin, voxels. */
+/* --- where rays begin */
+
+/* Height of the rays' origins above a point, voxels. */
 static inline double vshi_shade_lift(const vsh_field *field, const vsh_shade_options *options) {
     return options->start_offset + options->surface_offset / field->voxel_size;
 }
 
-/* Where the rays of point i begin, `lift` voxels above it, and its unit normal, both in field space. False
- * for a point that is not finite or has no normal where normals are given (then *normal is zero). */
+/* Finds the origin of point i's rays, `lift` voxels above it, and its unit normal, both in field space. False
+ * for a point that is not finite, or has no normal although normals are given (*normal is then zero). */
 bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
                        vshi_vec *origin, vshi_vec *normal);
 
-/* What casters are grown by for rays that begin at a point of field space, voxels: up to field->grown. */
+/* The growth of casters for rays that begin at a point of field space, voxels: at most field->grown. */
 double vshi_shade_grown(const vsh_field *field, vshi_vec origin);
 
-/* Whether rays on the field from there are traced against its surface: where that is there, is grown by no
- * more than they are to see, and has them outside. */
+/* Whether rays from there are traced against the field's surface: it exists, is grown by no more than the
+ * rays may see, and has them outside. */
 bool vshi_shade_traces(const vsh_field *field, vshi_vec origin);
+
+/* A point on a triangle, world space. Shadow rays begin on the triangle, or are lifted towards the smooth
+ * surface that the vertex normals describe (mesh/mesh.h). Then the facets of a smooth mesh do not hide a
+ * light above the smooth surface. AO needs no lift: it leaves out the directions below the face. */
+typedef struct vshi_lift_point {
+    vshi_vec foot;         /* on the triangle */
+    vshi_vec lift;         /* from there to the smooth surface */
+    vshi_vec face, normal; /* unit: of the triangle, of the smooth surface */
+} vshi_lift_point;
+
+/* A light that points are lifted for. */
+typedef struct vshi_lifter {
+    const vsh_occluders *occluders; /* their triangles limit the lift */
+    const vsh_light *light;         /* NULL: AO, which lifts nothing */
+    vshi_light_place place;         /* of the light, in world space */
+} vshi_lifter;
+
+vshi_lifter vshi_lifter_open(const vsh_occluders *occluders, const vsh_light *light);
+
+/* Whether a part of the light lies below the plane of the point's triangle. */
+bool vshi_light_is_cut(const vshi_lifter *lifter, const vshi_lift_point *point);
+
+/* Finds the lift of a point for the light: point->lift times a share from 0 to 1. */
+vshi_vec vshi_lift_find(const vshi_lifter *lifter, const vshi_lift_point *point);
+
+/* --- points in solids or behind walls, by rays against the triangles that bound them (inside.c) */
+
+enum { VSHI_OUTSIDE = 0, VSHI_INSIDE = 1 };
+
+/* Whether another source knows that point `i` is in the open. Called only if a few rays leave doubt. */
+typedef bool vshi_open_fn(const void *user, size_t i);
+
+/* Tests `count` points [count][3] on surfaces, a hair above them along their normals [count][3] (unit, or
+ * zero for any direction). Writes where[count]. `open` may be NULL. follows[count]: whether a point is next
+ * to the one before it on a surface. The two then share a result unless a triangle parts them. NULL: each
+ * result depends on its point alone. Thread safe. */
+void vshi_inside(const vshi_triangles *triangles, size_t count, const double *positions, const float *normals,
+                 const bool *follows, vshi_open_fn *open, const void *user, uint8_t *where);
+
+/* --- chunks of cones: set up in double precision, marched, read back (rays.c) */
+
+/* A cone in field space. */
+typedef struct vshi_cone {
+    vshi_vec origin;
+    vshi_vec direction; /* unit */
+    double begin;       /* the cone is free up to here; 0: nothing is known */
+    double end;         /* the cone is free from here on; may be infinite, or before `begin` */
+    double whole;       /* of shadows: the end before anything was proved; else 0 */
+    double sine;        /* of the half angle; 0: a ray */
+    double close;       /* upper bound of its closeness: at most `sine`; 1 for rays */
+    double stop;
+    double horizon; /* of proofs: see vshi_chunk */
+    double wide;    /* of beams: radius at the origin; else 0 */
+    double deeper;  /* of beams: see vshi_chunk; else 0 */
+} vshi_cone;
+
+/* Adds a cone if it can meet the casters' bounds. Otherwise returns false: its closeness then stays as it is.
+ * An unknown field gets no cones. */
+bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
+                    vsh_shade_stats *stats);
+
+/* Marches a chunk's rays, VSHI_MARCH_…, and counts the work. An unfinished proof proves nothing, so it does
+ * not count as unfinished. */
+void vshi_chunk_march(vshi_chunk *chunk, const vshi_kernel *kernel, const vsh_field *field, int32_t kind,
+                      int32_t max_steps, vsh_shade_stats *stats);
+
+/* Visible fraction of a cone by its sine and closeness (h / t). The closeness is the sine of the angle
+ * between the axis and the occluder's edge. The tangents of both angles are the disc's radius and the edge's
+ * offset. */
+double vshi_cone_visibility(double closeness, double sine);
+
+/* --- errors of rays */
+
+/* Standard error that an edge across the disc leaves in the share of lit rays: c sqrt(p (1 - p)) n^-3/4, for
+ * white noise n^-1/2, measured over edges of all places and directions (test_sampler). `lit` of `taken` rays
+ * were lit, and the share was `expected` (a half if unknown). */
+double vshi_rays_deviation(int32_t sampler, int32_t lit, int32_t taken, double expected);
+
+/* Standard error of the share of lit rays, with the rays of the points around. An edge across the disc cuts
+ * as many of the rays' cells as its chord is long. Towards the rim the chord shrinks more slowly than the
+ * part beyond it. So the variance is c (p (1 - p))^1/3 n^-3/2 (test_sampler), or the binomial's
+ * p (1 - p) / n if that is less. If all rays agree, the error is what they may have missed. */
+double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_around, double taken_around);
+
+/* Factor on errors that use the neighbours' share in place of the point's. Measured on the seeds' floor,
+ * where the estimate is then right to a tenth. */
+#define VSHI_BORROWED 1.2
 
 #endif

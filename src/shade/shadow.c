@@ -1,15 +1,15 @@
 /* Shadow values: the visible fraction of a light, by one cone or ray a point. */
 #include "shade/shadow.h"
+#include "base/bytes.h"
 #include "base/elementary.h"
 #include "base/floats.h"
-#include "base/hash.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 
 #include <math.h>
 #include <stdio.h>
 
-/* Of a march by practical: what is less is dark. */
+/* A march by practical ends here: less of the light is dark. */
 static const double PRACTICAL_END = 0.004;
 
 /* Turns a closeness into a visible fraction, by method. */
@@ -31,12 +31,12 @@ static float remap(int32_t method, double closeness, double sine) {
     }
 }
 
-/* The cone of point i, which begins at `origin`: the light's own to one march, one that holds all of it to
- * rays. Where a lamp stands, and whether it is over the horizon, is seen from the point itself: one that is
- * nearer than the start offset would else be below it. */
+/* Aims the cone of point i, which begins at `origin`. One march gets the light's own cone, rays get one that
+ * holds the whole light. The lamp is seen from the point itself: a lamp nearer than the start offset would
+ * otherwise be below the horizon. */
 static vshi_light_side aim(const vshi_shadow_task *task, size_t i, vshi_vec origin, vshi_cone *cone) {
-    const bool hard = task->options->method == VSH_SHADOW_HARD,
-               has_rays = vshi_shadow_has_rays(task->options);
+    const bool hard = task->options.method == VSH_SHADOW_HARD,
+               has_rays = vshi_shadow_has_rays(&task->options);
     *cone = (vshi_cone){.origin = origin, .horizon = INFINITY};
     vshi_light_view view;
     const vshi_light_side side = vshi_light_look(
@@ -51,7 +51,7 @@ static vshi_light_side aim(const vshi_shadow_task *task, size_t i, vshi_vec orig
 
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
                         vshi_chunk *chunk, vsh_shade_stats *stats) {
-    const double lift = vshi_shade_lift(task->field, task->options);
+    const double lift = vshi_shade_lift(task->field, &task->options);
     facing->count = 0;
     for (size_t i = begin; i < end; ++i) {
         vshi_cone *cone = &facing->cone[facing->count];
@@ -90,53 +90,53 @@ double vshi_shadow_above(const vshi_shadow_task *task, size_t i) {
         return 1.0;
     }
     const vshi_vec normal = vshi_direction_to_field(task->field, vshi_vec_off(points->normals + 3 * i));
-    const vshi_light_shape *shape = task->place.shape;
-    if (shape != NULL && vshi_shadow_has_rays(task->options)) {
-        return shape->above(&task->place, vshi_to_field(task->field, points->positions + 3 * i), normal);
+    if (task->place.is_rectangle && vshi_shadow_has_rays(&task->options)) {
+        return vshi_rectangle_above(&task->place, vshi_to_field(task->field, points->positions + 3 * i),
+                                    normal);
     }
     const double sine = vshi_dot(normal, cone.direction);
-    return (double)remap(task->options->method, sine < cone.sine || cone.sine <= 0.0 ? sine : cone.sine,
+    return (double)remap(task->options.method, sine < cone.sine || cone.sine <= 0.0 ? sine : cone.sine,
                          cone.sine);
 }
 
-/* What the steps of a point are shortened to. */
+/* The share to which the steps of a point are shortened. */
 static float pace_of(const vshi_shadow_task *task, size_t point) {
     const vsh_points *points = task->points;
     const uint64_t texel = points->texels != NULL ? points->texels[point] : point;
     const uint64_t bits =
-        vshi_mix((texel + 1) * UINT64_C(0x9e3779b97f4a7c15) + (uint64_t)task->options->frame);
-    return (float)(1.0 - task->options->jitter * (double)(bits >> 11) * 0x1p-53);
+        vshi_mix((texel + 1) * UINT64_C(0x9e3779b97f4a7c15) + (uint64_t)task->options.frame);
+    return (float)(1.0 - task->options.jitter * (double)(bits >> 11) * 0x1p-53);
 }
 
 static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const int32_t method = task->options->method;
+    const int32_t method = task->options.method;
     vshi_facing facing;
     vshi_chunk chunk;
     vshi_shadow_gather(task, begin, end, &facing, &chunk, stats);
     for (size_t i = 0; i < facing.count; ++i) {
         vshi_cone *cone = &facing.cone[i];
         const bool hard = cone->sine <= 0.0;
-        /* the receiver's own horizon is an edge like any other: its sine is the closeness of a plane */
+        /* the receiver's own horizon is an edge: its sine is the closeness of a plane */
         cone->close = hard ? 1.0 : cone->horizon < cone->sine ? cone->horizon : cone->sine;
         cone->stop = method == VSH_SHADOW_PRACTICAL ? PRACTICAL_END * cone->sine : -task->lowest * cone->sine;
         if (!vshi_chunk_add(&chunk, task->field, cone, (uint32_t)i, stats)) {
-            /* in floats, as the kernel gives it back: whether there is a march depends on the neighbours */
+            /* in floats, as the kernel returns it: whether a cone marches depends on the neighbours */
             task->visibility[facing.point[i]] =
                 remap(method, (double)(float)cone->close, (double)(float)cone->sine);
             stats->certified += cone->close >= cone->sine;
         }
     }
-    const bool jittered = task->options->jitter > 0.0 && method != VSH_SHADOW_IMPROVED;
-    for (size_t r = 0; jittered && r < chunk.rays.count; ++r) {
-        chunk.rays.pace[r] = pace_of(task, facing.point[chunk.owner[r]]);
+    const bool jittered = task->options.jitter > 0.0 && method != VSH_SHADOW_IMPROVED;
+    for (size_t r = 0; jittered && r < chunk.count; ++r) {
+        chunk.pace[r] = pace_of(task, facing.point[chunk.owner[r]]);
     }
     const int32_t kind = jittered                        ? VSHI_MARCH_JITTERED
                          : method == VSH_SHADOW_IMPROVED ? VSHI_MARCH_TRIANGULATED
                                                          : VSHI_MARCH_PLAIN;
-    vshi_chunk_march(&chunk, task->kernel, task->field, kind, task->options->max_steps, stats);
-    for (size_t r = 0; r < chunk.rays.count; ++r) {
-        const double closeness = chunk.rays.close[r];
-        const double sine = chunk.rays.sine[r];
+    vshi_chunk_march(&chunk, task->kernel, task->field, kind, task->options.max_steps, stats);
+    for (size_t r = 0; r < chunk.count; ++r) {
+        const double closeness = chunk.close[r];
+        const double sine = chunk.sine[r];
         stats->certified += sine > 0.0 && (closeness >= sine || closeness <= -sine);
         task->visibility[facing.point[chunk.owner[r]]] = remap(method, closeness, sine);
     }
@@ -144,7 +144,7 @@ static void shade_points(const vshi_shadow_task *task, size_t begin, size_t end,
 
 void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_shadow_task *task = user;
-    if (vshi_shadow_has_rays(task->options)) {
+    if (vshi_shadow_has_rays(&task->options)) {
         vshi_shadow_by_rays(task, begin, end, stats);
     } else {
         shade_points(task, begin, end, stats);
@@ -159,62 +159,62 @@ void vshi_shadow_shade(const void *user, size_t begin, size_t end, vsh_shade_sta
 
 vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *light,
                                const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error) {
+    *task = (vshi_shadow_task){.sampler = NULL};
     VSHI_TRY(vsh_light_check(light, error));
     const vsh_field *field = occluders->field;
-    const vsh_triangles *triangles = occluders->triangles;
-    if (vshi_shadow_traces(options, triangles) && triangles == NULL) {
+    const vshi_triangles *triangles = occluders->triangles;
+    vsh_shade_options full = *options;
+    vshi_shade_options_settle(&full, triangles);
+    const bool traced = vshi_shadow_traces(&full, triangles);
+    if (traced && triangles == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "method exact: the occluders have no triangles, which it traces");
     }
-    if (field->unknown && !vshi_shadow_traces(options, triangles)) {
+    if (field->unknown && !traced) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "method %s: the occluders have no voxels, which it marches; exact needs none",
-                         vsh_get_name(VSH_NAMES_SHADOW, options->method));
+                         vsh_get_name(VSH_NAMES_SHADOW, full.method));
     }
-    const bool inner = (vsh_shadow_method_traits(options->method) & VSH_METHOD_INNER) != 0;
-    *task = (vshi_shadow_task){.field = field,
-                               .triangles = triangles,
-                               .light = light,
-                               .options = options,
-                               .lowest = inner ? 1.0 : 0.0};
-    task->leaky = vshi_shadow_traces(options, triangles) &&
-                  (field->shell_thickness > 0.0 || vshi_triangles_have_holes(triangles));
+    const bool inner = (vsh_shadow_method_traits(full.method) & VSH_METHOD_INNER) != 0;
+    *task = (vshi_shadow_task){
+        .field = field, .triangles = triangles, .light = light, .options = full, .lowest = inner ? 1.0 : 0.0};
+    task->leaky = traced && (field->shell_thickness > 0.0 || vshi_triangles_have_holes(triangles));
     task->world = vshi_light_in_world(light);
     task->place = vshi_light_moved(&task->world, field->to_field, field->voxel_size);
     for (size_t i = 0; i < sizeof light->name && light->name[i] != '\0'; ++i) {
         task->purpose = 31u * task->purpose + (unsigned char)light->name[i];
     }
-    return VSH_OK;
+    if (!vshi_shadow_has_rays(&full)) {
+        return VSH_OK;
+    }
+    task->sampler = vshi_sampler_create(full.sampler, vshi_shadow_most_rays(&full), full.frame);
+    return task->sampler != NULL ? VSH_OK
+                                 : vshi_fail(error, VSH_ERROR_MEMORY, "shadow: the system refused memory");
 }
 
-void vshi_shadow_close(vshi_shadow_shader *shader) {
-    vshi_sampler_free(shader->sampler);
-    vshi_layers_free(shader->layers);
-    *shader = (vshi_shadow_shader){.sampler = NULL};
+void vshi_shadow_close(vshi_shadow_task *task) {
+    vshi_sampler_free(task->sampler);
+    vshi_layers_free(task->layers);
 }
 
 vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *light,
-                            const vsh_shade_options *options, int32_t isa, vshi_shadow_shader *shader,
+                            const vsh_shade_options *options, int32_t isa, vshi_shadow_task *task,
                             vsh_error *error) {
-    *shader = (vshi_shadow_shader){.sampler = NULL};
-    VSHI_TRY(vshi_shade_options_resolve(options, &shader->options, error));
+    vsh_shade_options full;
+    vshi_layers *layers;
+    *task = (vshi_shadow_task){.sampler = NULL};
+    VSHI_TRY(vshi_shade_options_resolve(options, &full, error));
     VSHI_TRY(vsh_light_check(light, error));
-    VSHI_TRY(vshi_layers_prepare(occluders, &shader->options, light, false, &shader->layers, error));
-    vshi_shade_options_settle(&shader->options, occluders->triangles);
-    VSHI_TRY(vshi_shadow_prepare(occluders, light, &shader->options, &shader->task, error));
-    if (vshi_shadow_has_rays(&shader->options)) {
-        VSHI_TRY(vshi_shade_sampler(&shader->options, vshi_shadow_most_rays(&shader->options), "shadow",
-                                    &shader->sampler, error));
-    }
-    shader->task.layers = shader->layers;
-    shader->task.sampler = shader->sampler;
-    shader->task.kernel = vshi_kernel_of(isa);
-    return VSH_OK;
+    VSHI_TRY(vshi_layers_prepare(occluders, &full, light, false, &layers, error));
+    const vsh_result result = vshi_shadow_prepare(occluders, light, &full, task, error);
+    task->layers = layers;
+    task->kernel = vshi_kernel_of(isa);
+    return result;
 }
 
-void vshi_shadow_points(const vshi_shadow_shader *shader, const vsh_points *points, float *visibility,
+void vshi_shadow_points(const vshi_shadow_task *prepared, const vsh_points *points, float *visibility,
                         float *deviation, vsh_shade_stats *stats) {
-    vshi_shadow_task task = shader->task;
+    vshi_shadow_task task = *prepared;
     task.points = points;
     task.visibility = visibility;
     task.deviation = deviation;
@@ -234,18 +234,18 @@ vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *po
     VSHI_NEEDS_OF(points->count, visibility);
     vsh_run full_run;
     VSHI_TRY(vshi_run_resolve(run, &full_run, error));
-    vshi_shadow_shader shader;
+    vshi_shadow_task task;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_shadow_open(occluders, light, options, full_run.isa, &shader, error));
+    VSHI_TRY_DONE(vshi_shadow_open(occluders, light, options, full_run.isa, &task, error));
     char stage[sizeof light->name + 8];
     snprintf(stage, sizeof stage, "shadow.%.*s", (int)sizeof light->name, light->name);
-    shader.task.points = points;
-    shader.task.visibility = visibility;
-    shader.task.deviation = deviation;
-    result = vshi_shade_run(&full_run, stage, points->count, VSHI_PIECE, vshi_shadow_shade, &shader.task,
-                            stats, error);
+    task.points = points;
+    task.visibility = visibility;
+    task.deviation = deviation;
+    result =
+        vshi_shade_run(&full_run, stage, points->count, VSHI_PIECE, vshi_shadow_shade, &task, stats, error);
 done:
-    vshi_shadow_close(&shader);
+    vshi_shadow_close(&task);
     return result;
 }
 

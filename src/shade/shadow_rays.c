@@ -1,6 +1,6 @@
-/* Shadow values from rays over the light's disc: all of them (rays), or as many as a cone leaves open
+/* Shadow values from rays over the light's disc: a fixed number (rays), or as many as a cone leaves open
  * (adaptive, on the field; exact, on the triangles). */
-#include "shade/interpolation.h"
+#include "shade/shadow.h"
 #include "trace/embree.h"
 
 #include <math.h>
@@ -8,19 +8,19 @@
 
 enum { PACKET_POINTS = 64 };
 
-/* --- points whose values take rays, and those rays on their way: marched, or traced against triangles or the
- * field's surface, alone or in packets of several points */
+/* --- points with rays, and their rays, which are marched, or traced against triangles or the field's
+ * surface, alone or in packets of several points */
 
-/* A point whose value takes rays. */
+/* A point whose value needs rays. */
 typedef struct open_point {
     size_t point;
     vshi_vec origin, normal; /* field space; no normal: zero */
-    vshi_vec axis, u, v;     /* towards the light, and over its disc a unit away; exact: in world space */
-    vshi_vec start;          /* exact: of its rays, world space */
-    vshi_light_view view;    /* a light with a shape, as the point itself sees it */
-    vshi_vec off;            /* from that point to where its rays begin, in the rays' space */
+    vshi_vec axis, u, v;  /* towards the light, and over its disc at a distance of 1; exact: in world space */
+    vshi_vec start;       /* exact: of its rays, world space */
+    vshi_light_view view; /* of a rectangle, from the point itself */
+    vshi_vec off;         /* from that point to where its rays begin, in the rays' space */
     double end;
-    bool traced; /* its rays, against triangles or the field's surface; else they are marched */
+    bool traced; /* its rays meet triangles or the field's surface; else they are marched */
     int32_t lit, taken;
     bool near; /* traced: near enough to the triangles for packets */
     double deviation;
@@ -28,8 +28,8 @@ typedef struct open_point {
 
 typedef struct ray_batch {
     const vshi_shadow_task *task;
-    open_point *open;
     size_t open_count;
+    open_point open[VSHI_PIECE];
     vshi_chunk chunk;
     vshi_segment_ray traced[VSHI_CHUNK];
     bool blocked[VSHI_CHUNK];
@@ -44,28 +44,28 @@ static bool is_hard(const vshi_shadow_task *task) {
     return vshi_light_is_point(&task->place);
 }
 
-/* Rays on triangles begin this part of the casters' size off the surface: above the rounding of floats, below
- * what shows. */
+/* Height of the origins of rays on triangles, as a share of the casters' size: above the rounding of floats,
+ * below what is visible. */
 static const double TRACE_LIFT = 0x1p-18;
 
 /* The triangles that rays meet: the casters' in world space, or the field's surface in its own. */
-static const vsh_triangles *traced_of(const vshi_shadow_task *task) {
-    return task->options->method == VSH_SHADOW_EXACT ? task->triangles : task->field->surface;
+static const vshi_triangles *traced_of(const vshi_shadow_task *task) {
+    return task->options.method == VSH_SHADOW_EXACT ? task->triangles : task->field->surface;
 }
 
 /* The origin of a point's traced rays, in the space of these triangles. */
 static vshi_vec begin_of(const vshi_shadow_task *task, const open_point *p) {
-    return task->options->method == VSH_SHADOW_EXACT ? p->start : p->origin;
+    return task->options.method == VSH_SHADOW_EXACT ? p->start : p->origin;
 }
 
 static void flush(ray_batch *batch) {
     const vshi_shadow_task *task = batch->task;
-    vshi_chunk_march(&batch->chunk, task->kernel, task->field, VSHI_MARCH_PLAIN, task->options->max_steps,
+    vshi_chunk_march(&batch->chunk, task->kernel, task->field, VSHI_MARCH_PLAIN, task->options.max_steps,
                      batch->stats);
-    for (size_t r = 0; r < batch->chunk.rays.count; ++r) {
-        batch->open[batch->chunk.owner[r]].lit += batch->chunk.rays.close[r] > 0.0f;
+    for (size_t r = 0; r < batch->chunk.count; ++r) {
+        batch->open[batch->chunk.owner[r]].lit += batch->chunk.close[r] > 0.0f;
     }
-    vshi_chunk_clear(&batch->chunk);
+    batch->chunk.count = 0;
     if (batch->traced_count > 0) {
         vshi_triangles_blocked(traced_of(task), batch->traced, batch->traced_count, batch->blocked);
         for (size_t r = 0; r < batch->traced_count; ++r) {
@@ -84,7 +84,7 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
         const double side = task->field->world_max[axis] - task->field->world_min[axis];
         size = side > size ? side : size;
     }
-    const double lift = TRACE_LIFT * size + task->options->surface_offset;
+    const double lift = TRACE_LIFT * size + task->options.surface_offset;
     p->normal = vshi_direction_to_world(task->field, p->normal);
     p->axis = vshi_direction_to_world(task->field, p->axis);
     p->u = vshi_scale(vshi_direction_to_world(task->field, p->u), tangent);
@@ -94,31 +94,21 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
     p->end = vshi_light_look(&task->world, p->start, false, &view) == VSHI_LIGHT_SEEN ? view.end : 0.0;
 }
 
-/* Looks at a light that is no disc, in the space of the rays. */
-static void look_at_shape(const vshi_shadow_task *task, open_point *p) {
-    const double *at = task->points->positions + 3 * p->point;
-    const bool traced = task->options->method == VSH_SHADOW_EXACT;
-    const vshi_vec from = traced ? vshi_vec_of(at) : vshi_to_field(task->field, at);
-    vshi_light_look(traced ? &task->world : &task->place, from, false, &p->view);
-    p->off = vshi_sub(traced ? p->start : p->origin, from);
-}
-
-/* Unit direction of the ray to a place on the unit disc, and how far it goes; false below the horizon. */
+/* Finds the direction of the ray to a place on the unit disc, and its length. False below the horizon. */
 static bool direct(const vshi_shadow_task *task, const open_point *p, const double disc[2], vshi_vec *d,
                    double *end) {
     const bool horizon = task->points->normals != NULL;
-    const vshi_light_shape *shape = task->place.shape;
     *end = p->end;
-    if (shape == NULL) {
+    if (!task->place.is_rectangle) {
         *d = vshi_unit(vshi_add(p->axis, vshi_add(vshi_scale(p->u, disc[0]), vshi_scale(p->v, disc[1]))));
         return !(horizon && vshi_dot(*d, p->normal) <= 0.0);
     }
-    const bool traced = task->options->method == VSH_SHADOW_EXACT;
-    const vshi_vec way = shape->ray(traced ? &task->world : &task->place, &p->view, disc);
+    const bool traced = task->options.method == VSH_SHADOW_EXACT;
+    const vshi_vec way = vshi_rectangle_ray(traced ? &task->world : &task->place, &p->view, disc);
     const vshi_vec to = vshi_sub(way, p->off);
     const double length = vshi_length(to), ahead = vshi_dot(to, p->axis);
     *d = vshi_unit(to);
-    /* a proof ends the cone early, at a depth along its axis */
+    /* a proof ends the cone early, by depth along its axis */
     *end = !traced && ahead > p->end ? length * p->end / ahead : length;
     return !(horizon && vshi_dot(way, p->normal) <= 0.0);
 }
@@ -127,7 +117,7 @@ static uint32_t texel_of(const vshi_shadow_task *task, const open_point *p) {
     return task->points->texels != NULL ? task->points->texels[p->point] : (uint32_t)p->point;
 }
 
-/* Rays taken … target - 1 of an open point. */
+/* Casts rays taken … target - 1 of an open point. */
 static void cast(ray_batch *batch, size_t owner, int32_t target) {
     const vshi_shadow_task *task = batch->task;
     open_point *p = &batch->open[owner];
@@ -144,7 +134,7 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
             if (!direct(task, p, disc[i], &d, &end)) {
                 continue;
             }
-            if (batch->chunk.rays.count == VSHI_CHUNK || batch->traced_count == VSHI_CHUNK) {
+            if (batch->chunk.count == VSHI_CHUNK || batch->traced_count == VSHI_CHUNK) {
                 flush(batch);
             }
             if (p->traced) {
@@ -161,13 +151,7 @@ static void cast(ray_batch *batch, size_t owner, int32_t target) {
     }
 }
 
-/* Whether the rays of open points are traced in packets of several points each: discs, and the sampler's
- * blocks. */
-static bool in_packets(const vshi_shadow_task *task) {
-    return task->place.shape == NULL && task->options->sampler == VSH_SAMPLER_SOBOL && !is_hard(task);
-}
-
-/* Rays first … last - 1 of open points that have `first`. */
+/* Casts rays first … last - 1 of open points that have `first`. */
 static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int32_t first, int32_t last) {
     const vshi_shadow_task *task = batch->task;
     vshi_disc discs[PACKET_POINTS];
@@ -196,7 +180,7 @@ static void cast_packets(ray_batch *batch, const size_t *some, size_t count, int
     }
 }
 
-/* Sets *p to point `point` of the task, whose cone is not proved; without a normal that is zero. */
+/* Sets *p to point `point`, whose cone is not proved. `normal` is zero without normals. */
 static void begin_open_point(const vshi_shadow_task *task, size_t point, const vshi_cone *cone,
                              vshi_vec normal, open_point *p) {
     const double tangent = cone->sine / sqrt(1.0 - cone->sine * cone->sine);
@@ -205,33 +189,30 @@ static void begin_open_point(const vshi_shadow_task *task, size_t point, const v
     vshi_frame(cone->direction, &p->u, &p->v);
     p->u = vshi_scale(p->u, tangent);
     p->v = vshi_scale(p->v, tangent);
-    p->traced = task->options->method == VSH_SHADOW_EXACT ||
-                (task->options->method == VSH_SHADOW_ADAPTIVE && vshi_shade_traces(task->field, p->origin));
-    if (task->options->method == VSH_SHADOW_EXACT) {
+    p->traced = task->options.method == VSH_SHADOW_EXACT ||
+                (task->options.method == VSH_SHADOW_ADAPTIVE && vshi_shade_traces(task->field, p->origin));
+    if (task->options.method == VSH_SHADOW_EXACT) {
         turn_to_world(task, p);
     }
     if (p->traced) {
         const vshi_vec from = begin_of(task, p);
         p->near = vshi_triangles_sees(traced_of(task), (double[]){from.x, from.y, from.z});
     }
-    if (task->place.shape != NULL) {
-        look_at_shape(task, p);
+    if (task->place.is_rectangle) {
+        const bool exact = task->options.method == VSH_SHADOW_EXACT;
+        const double *at = task->points->positions + 3 * p->point;
+        const vshi_vec from = exact ? vshi_vec_of(at) : vshi_to_field(task->field, at);
+        vshi_light_look(exact ? &task->world : &task->place, from, false, &p->view);
+        p->off = vshi_sub(exact ? p->start : p->origin, from);
     }
 }
 
-/* Of some open points the most rays that one has below `limit`; -1: none has. */
-static int32_t most_below(const ray_batch *batch, const size_t *some, size_t count, int32_t limit) {
-    int32_t most = -1;
-    for (size_t i = 0; i < count; ++i) {
-        const int32_t taken = batch->open[some[i]].taken;
-        most = taken < limit && taken > most ? taken : most;
-    }
-    return most;
-}
-
-/* Rays up to `target` of those of some open points that have `taken`. */
+/* Casts rays up to `target` for the open points that have `taken`: in packets of several points if the light
+ * is a disc, and the rays are whole blocks of Sobol's sequence. */
 static void cast_alike(ray_batch *batch, const size_t *some, size_t count, int32_t taken, int32_t target) {
-    const bool packets = in_packets(batch->task) && vshi_sampler_is_blocks(taken, target);
+    const vshi_shadow_task *task = batch->task;
+    const bool packets = !task->place.is_rectangle && task->options.sampler == VSH_SAMPLER_SOBOL &&
+                         !is_hard(task) && vshi_sampler_is_blocks(taken, target);
     size_t alike[VSHI_PIECE], same = 0;
     for (size_t i = 0; i < count; ++i) {
         const open_point *p = &batch->open[some[i]];
@@ -244,12 +225,18 @@ static void cast_alike(ray_batch *batch, const size_t *some, size_t count, int32
     cast_packets(batch, alike, same, taken, target);
 }
 
-/* Casts rays for those of the open points that some[count] lists, until each has `most`, or (`doubling`)
- * twice as many as it has, `most` at most. */
+/* Casts rays for the listed open points until each has `most`, or, if `doubling`, twice its rays, at most
+ * `most`. Points with the most rays come first. */
 static void cast_all(ray_batch *batch, const size_t *some, size_t count, int32_t most, bool doubling) {
-    int32_t taken = most;
-    while ((taken = most_below(batch, some, count, taken)) >= 0) {
-        cast_alike(batch, some, count, taken, doubling && 2 * taken < most ? 2 * taken : most);
+    for (int32_t limit = most, taken; limit >= 0; limit = taken) {
+        taken = -1;
+        for (size_t i = 0; i < count; ++i) {
+            const int32_t own = batch->open[some[i]].taken;
+            taken = own < limit && own > taken ? own : taken;
+        }
+        if (taken >= 0) {
+            cast_alike(batch, some, count, taken, doubling && 2 * taken < most ? 2 * taken : most);
+        }
     }
     flush(batch);
 }
@@ -258,24 +245,23 @@ static void cast_all(ray_batch *batch, const size_t *some, size_t count, int32_t
 
 enum { FIRST_ROUND = 8 };
 
-/* The points whose rays tell what to expect of a point's: so many before and after it, no farther than this,
- * voxels. */
+/* Neighbours whose rays predict a point's share: this many before and after it, at most APART voxels away. */
 enum { AROUND = 4 };
 static const double APART = 4.0;
 
-/* Cones whose lowest side rises less than this over the receiver's plane are not proved: bumps of a tenth of
+/* Cones whose lowest side rises less than this above the receiver's plane are not proved: bumps of a tenth of
  * a voxel reach into them. */
 static const double GRAZING = 0.1;
 
-/* How far a march may go that saves rays on triangles, voxels. */
+/* A longer march, voxels, costs more than the rays on triangles that it saves. */
 static const double NEAR = 24.0;
 
-/* What the rays of the points around an open point say of it: how many are lit, of how many. */
+/* Sums of the rays around an open point. */
 typedef struct around {
     double lit, taken;
 } around;
 
-static around look_around(const ray_batch *batch, size_t owner) {
+static around sum_around(const ray_batch *batch, size_t owner) {
     const open_point *open = batch->open, *p = &open[owner];
     const size_t first = owner > AROUND ? owner - AROUND : 0;
     const size_t last = owner + AROUND < batch->open_count ? owner + AROUND : batch->open_count - 1;
@@ -290,28 +276,28 @@ static around look_around(const ray_batch *batch, size_t owner) {
     return a;
 }
 
-/* The deviation of an open point, its share expected to be that of the rays of the points around it (smoothed
- * by Laplace's rule of succession), or a half where none is near. */
+/* The deviation of an open point. Its expected share is that of the rays around (smoothed by Laplace's rule
+ * of succession), or a half without neighbours. */
 static double deviation_of(const ray_batch *batch, size_t owner) {
     const open_point *p = &batch->open[owner];
-    const around a = look_around(batch, owner);
+    const around a = sum_around(batch, owner);
     const double deviation =
-        vshi_rays_deviation(batch->task->options->sampler, p->lit, p->taken, (a.lit + 1.0) / (a.taken + 2.0));
+        vshi_rays_deviation(batch->task->options.sampler, p->lit, p->taken, (a.lit + 1.0) / (a.taken + 2.0));
     return a.taken > 0.0 ? VSHI_BORROWED * deviation : deviation;
 }
 
-/* The same, as it is said, and as errors below VSHI_COARSE are kept: the other leaves more unseen at the ends
- * of penumbrae than such an error. */
+/* The error of an open point as reported, and as kept for errors below VSHI_COARSE. deviation_of() leaves
+ * more than such an error unseen at the ends of penumbrae. */
 static double error_of(const ray_batch *batch, size_t owner) {
     const open_point *p = &batch->open[owner];
-    const around a = look_around(batch, owner);
-    return vshi_rays_error(batch->task->options->sampler, p->lit, p->taken, a.lit, a.taken);
+    const around a = sum_around(batch, owner);
+    return vshi_rays_error(batch->task->options.sampler, p->lit, p->taken, a.lit, a.taken);
 }
 
-/* Casts rays for some open points, twice as many in each round for those that are not known well enough, by
- * then: what is found of one tells of those around it. */
+/* Casts rays for some open points. Each round doubles the rays of points whose error is too large by then, as
+ * the rays of one point inform its neighbours. */
 static void cast_fine(ray_batch *batch, const size_t *some, size_t count, int32_t most) {
-    const vsh_shade_options *options = batch->task->options;
+    const vsh_shade_options *options = &batch->task->options;
     size_t unsettled[VSHI_PIECE], left = count;
     cast_all(batch, some, count, FIRST_ROUND < most ? FIRST_ROUND : most, false);
     while (left > 0) {
@@ -326,10 +312,10 @@ static void cast_fine(ray_batch *batch, const size_t *some, size_t count, int32_
     }
 }
 
-/* Casts rays for some open points, all up to the first target, then twice as many in each round for those
- * that are not settled. */
+/* Casts rays for some open points up to the first target, then doubles the rays of unsettled points in each
+ * round. */
 static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
-    const vsh_shade_options *options = batch->task->options;
+    const vsh_shade_options *options = &batch->task->options;
     const bool refining = options->method != VSH_SHADOW_RAYS;
     const bool hard = is_hard(batch->task);
     const int32_t most = hard ? 1 : vshi_shadow_most_rays(options);
@@ -360,15 +346,17 @@ static void cast_rounds(ray_batch *batch, const size_t *some, size_t count) {
 }
 
 static void settle(ray_batch *batch, size_t point, float value, float deviation) {
+    const double error = (double)deviation;
     vshi_shadow_settle(batch->task, point, value, deviation);
-    vshi_stats_add_error(batch->stats, (double)deviation);
+    batch->stats->square_error += error * error;
+    batch->stats->worst_error = error > batch->stats->worst_error ? error : batch->stats->worst_error;
 }
 
-/* What is said of a point whose rays were cast. Down to VSHI_COARSE rays end by deviation_of(), which knows
- * the ends of penumbrae too well: where all rays agree, of points that others may be interpolated from and of
- * samplers that leave more, the larger of the two is said, of the latter at most what was asked for. */
+/* The reported error of a point with rays. Down to VSHI_COARSE rays end by deviation_of(), which is too
+ * confident at the ends of penumbrae. So the larger of the two estimates, at most the error asked for, is
+ * reported where all rays agree, for anchors, and for samplers other than Sobol's. */
 static double said_of(const ray_batch *batch, size_t owner) {
-    const vsh_shade_options *options = batch->task->options;
+    const vsh_shade_options *options = &batch->task->options;
     const open_point *p = &batch->open[owner];
     if (options->method == VSH_SHADOW_RAYS || is_hard(batch->task)) {
         return p->deviation;
@@ -390,16 +378,16 @@ static void settle_cast(ray_batch *batch, const size_t *some, size_t count) {
     }
 }
 
-/* Casts rays for those of the open points, which `some` lists, that the others can be interpolated from,
- * interpolates these, and leaves the rest in `some`. Returns their number. */
+/* Casts rays for the anchors among the open points in `some`, interpolates others from them, and leaves the
+ * rest in `some`. Returns their number. */
 static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *some) {
     const vshi_shadow_task *task = batch->task;
     vshi_interpolation interp = {.points = task->points,
                                  .begin = begin,
                                  .count = end - begin,
-                                 .max_error = task->options->max_error,
-                                 .sampler = task->options->sampler,
-                                 .rays = vshi_interpolation_rays(task->options->max_error)};
+                                 .max_error = task->options.max_error,
+                                 .sampler = task->options.sampler,
+                                 .rays = vshi_interpolation_rays(task->options.max_error)};
     for (size_t k = 0; k < interp.count; ++k) {
         interp.value[k] = task->visibility[begin + k];
         interp.deviation[k] = 0.0f;
@@ -447,22 +435,22 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
     return left;
 }
 
-/* Proves cones free or full, and drops those points. */
+/* Proves cones free or full, and settles their points. */
 static void prove(ray_batch *batch, vshi_facing *facing) {
     const vshi_shadow_task *task = batch->task;
     for (size_t i = 0; i < facing->count; ++i) {
         vshi_cone *cone = &facing->cone[i];
-        /* the receiver's own plane is taken for free only where the ball above it is: a part thinner than a
-         * voxel beside the receiver, or over it, looks like the plane along the cone. Without this 10 of a
-         * million proofs on the cloister were wrong, all by something less than half a voxel away */
+        /* The march treats the receiver's own plane as free only inside the ball above it. A part thinner
+         * than a voxel beside or above the receiver looks like the plane along the cone. Without this 10 of a
+         * million proofs on the cloister were wrong, all by something less than half a voxel away. */
         const double horizon = cone->horizon;
         if (cone->begin <= 0.0) {
             cone->horizon = INFINITY;
         }
-        /* nothing to prove where the receiver's own plane hides a part of the light, or nearly does; and
-         * where no block around the point was, a few rays on triangles cost less than a long march */
+        /* A proof is hopeless if the receiver's own plane hides a part of the light, or nearly does. If no
+         * block around the point was proved, a few rays on triangles cost less than a long march. */
         const bool promising =
-            isfinite(cone->sine) && (task->options->method != VSH_SHADOW_EXACT || !facing->gathered[i] ||
+            isfinite(cone->sine) && (task->options.method != VSH_SHADOW_EXACT || !facing->gathered[i] ||
                                      cone->end < cone->begin + NEAR);
         if (promising && horizon >= cone->sine + GRAZING &&
             !vshi_chunk_add(&batch->chunk, task->field, cone, (uint32_t)i, batch->stats)) {
@@ -471,48 +459,47 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
             ++batch->stats->certified;
         }
     }
-    vshi_chunk_march(&batch->chunk, task->kernel, task->field, VSHI_MARCH_PROOF, task->options->max_steps,
+    vshi_chunk_march(&batch->chunk, task->kernel, task->field, VSHI_MARCH_PROOF, task->options.max_steps,
                      batch->stats);
-    for (size_t r = 0; r < batch->chunk.rays.count; ++r) {
+    for (size_t r = 0; r < batch->chunk.count; ++r) {
         const size_t i = batch->chunk.owner[r];
-        const uint8_t proof = (uint8_t)batch->chunk.rays.proof[r];
-        /* what fills the cone around a shape may stand behind a part of it */
-        const bool is_full = proof == VSHI_PROVED_FULL && !task->leaky && task->place.shape == NULL;
+        const uint8_t proof = (uint8_t)batch->chunk.proof[r];
+        /* a solid in the cone may stand behind a part of the rectangle */
+        const bool is_full = proof == VSHI_PROVED_FULL && !task->leaky && !task->place.is_rectangle;
         if (proof == VSHI_PROVED_FREE || is_full) {
             vshi_shadow_settle(task, facing->point[i], proof == VSHI_PROVED_FREE ? 1.0f : 0.0f, 0.0f);
             facing->settled[i] = true;
             ++batch->stats->certified;
         }
     }
-    vshi_chunk_clear(&batch->chunk);
+    batch->chunk.count = 0;
 }
 
-void vshi_shadow_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
-    const vshi_shadow_task *task = user;
+void vshi_shadow_by_rays(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats) {
     vshi_facing facing;
-    open_point open[VSHI_PIECE];
     ray_batch batch;
     batch.task = task;
-    batch.open = open;
     batch.open_count = batch.traced_count = 0;
     batch.stats = stats;
     vshi_shadow_gather(task, begin, end, &facing, &batch.chunk, stats);
-    if (task->options->method != VSH_SHADOW_RAYS) {
+    if (task->options.method != VSH_SHADOW_RAYS) {
         prove(&batch, &facing);
     }
     for (size_t i = 0; i < facing.count; ++i) {
         if (facing.settled[i]) {
             continue;
         }
-        begin_open_point(task, facing.point[i], &facing.cone[i], facing.normal[i], &open[batch.open_count++]);
+        begin_open_point(task, facing.point[i], &facing.cone[i], facing.normal[i],
+                         &batch.open[batch.open_count++]);
     }
     size_t some[VSHI_PIECE], count = batch.open_count;
     for (size_t o = 0; o < count; ++o) {
         some[o] = o;
     }
-    batch.shared = task->options->method != VSH_SHADOW_RAYS &&
-                   vshi_shadow_most_rays(task->options) > vshi_interpolation_rays(task->options->max_error) &&
-                   !is_hard(task) && !task->scattered && vshi_interpolation_can(task->points);
+    batch.shared = task->options.method != VSH_SHADOW_RAYS &&
+                   vshi_shadow_most_rays(&task->options) > vshi_interpolation_rays(task->options.max_error) &&
+                   !is_hard(task) && !task->scattered && task->points->texels != NULL &&
+                   task->points->normals != NULL;
     if (batch.shared) {
         count = cast_shared(&batch, begin, end, some);
     }

@@ -1,15 +1,140 @@
 #include "shade/window.h"
 
+#include "base/vec.h"
+
 #include <math.h>
+
+/* --- links */
+
+/* Neighbours are linked if the cosine between their normals is at least ALIKE, and the sine of the angle
+ * between the step and both surfaces at most STEEP. */
+static const double ALIKE = 0.94, STEEP = 0.35;
+/* A link is at most this many times as long as the shortest step around: charts that touch lie apart in the
+ * world. */
+static const float LONG = 4.0f;
+/* Points of a plane are this close to it, as a share of the square's sides. */
+static const double FLAT = 0.1;
+
+/* Length of the step between two points; INFINITY if no surface connects them. */
+static float step_of(const vshi_texel_map *map, size_t a, size_t b) {
+    if (a == 0 || b == 0) {
+        return INFINITY;
+    }
+    const vshi_vec na = vshi_vec_off(map->normal + 3 * (a - 1)), nb = vshi_vec_off(map->normal + 3 * (b - 1));
+    if (!(vshi_dot(na, nb) >= ALIKE)) {
+        return INFINITY;
+    }
+    const vshi_vec d =
+        vshi_sub(vshi_vec_off(map->position + 3 * (b - 1)), vshi_vec_off(map->position + 3 * (a - 1)));
+    const double square = vshi_dot(d, d), up = vshi_dot(d, na), down = vshi_dot(d, nb);
+    const double most = STEEP * STEEP * square;
+    return up * up <= most && down * down <= most ? (float)sqrt(square) : INFINITY;
+}
+
+/* Length of a path of several steps along a row or column; INFINITY if one is missing. */
+static float path_of(const vshi_texel_map *map, int32_t x, int32_t y, int32_t dx, int32_t dy, int32_t steps) {
+    const size_t from = vshi_texel_at(map, x, y);
+    size_t last = from;
+    for (int32_t k = 1; k < steps; ++k) {
+        const size_t next = vshi_texel_at(map, x + k * dx, y + k * dy);
+        if (!(step_of(map, last, next) < INFINITY)) {
+            return INFINITY;
+        }
+        last = next;
+    }
+    const size_t end = vshi_texel_at(map, x + steps * dx, y + steps * dy);
+    return last == from || step_of(map, last, end) < INFINITY ? step_of(map, from, end) : INFINITY;
+}
+
+/* The shortest step from a texel. */
+static float shortest(const vshi_window_texel *texels, int32_t width, int32_t height, int32_t x, int32_t y) {
+    const vshi_window_texel *e = texels + (size_t)y * (size_t)width + (size_t)x;
+    float least = fminf(e->step[0], e->step[1]);
+    least = x + 1 < width ? fminf(least, e[1].step[0]) : least;
+    return y + 1 < height ? fminf(least, e[width].step[1]) : least;
+}
+
+void vshi_links_find(const vshi_texel_map *map, const vshi_texel_lattice *lattice,
+                     vshi_window_texel *texels) {
+    const int32_t width = lattice->width, height = lattice->height, spacing = lattice->spacing;
+    for (int32_t y = 0; y < height; ++y) {
+        for (int32_t x = 0; x < width; ++x) {
+            const int32_t column = lattice->left + x * spacing, row = lattice->top + y * spacing;
+            vshi_window_texel *e = texels + (size_t)y * (size_t)width + (size_t)x;
+            e->step[0] = x > 0 ? path_of(map, column, row, -1, 0, spacing) : INFINITY;
+            e->step[1] = y > 0 ? path_of(map, column, row, 0, -1, spacing) : INFINITY;
+        }
+    }
+    for (int32_t y = 0; y < height; ++y) {
+        for (int32_t x = 0; x < width; ++x) {
+            vshi_window_texel *e = texels + (size_t)y * (size_t)width + (size_t)x;
+            const float left = e->step[0], above = e->step[1];
+            const float own = LONG * shortest(texels, width, height, x, y);
+            e->left =
+                left < INFINITY && left <= own && left <= LONG * shortest(texels, width, height, x - 1, y);
+            e->above =
+                above < INFINITY && above <= own && above <= LONG * shortest(texels, width, height, x, y - 1);
+        }
+    }
+}
+
+bool vshi_links_whole(const vshi_texel_map *map, int32_t column, int32_t row, int32_t spacing) {
+    const size_t corner = vshi_texel_at(map, column, row), right = vshi_texel_at(map, column + spacing, row),
+                 below = vshi_texel_at(map, column, row + spacing);
+    if (corner == 0 || right == 0 || below == 0) {
+        return false;
+    }
+    const vshi_vec p = vshi_vec_off(map->position + 3 * (corner - 1)),
+                   n = vshi_vec_off(map->normal + 3 * (corner - 1));
+    const double part = 1.0 / spacing;
+    const vshi_vec u = vshi_scale(vshi_sub(vshi_vec_off(map->position + 3 * (right - 1)), p), part);
+    const vshi_vec v = vshi_scale(vshi_sub(vshi_vec_off(map->position + 3 * (below - 1)), p), part);
+    const double most = FLAT * FLAT * (vshi_dot(u, u) + vshi_dot(v, v)) * spacing * spacing;
+    for (int32_t y = 0; y <= spacing; ++y) {
+        for (int32_t x = 0; x <= spacing; ++x) {
+            const size_t at = vshi_texel_at(map, column + x, row + y);
+            if (at == 0 || !(vshi_dot(n, vshi_vec_off(map->normal + 3 * (at - 1))) >= ALIKE)) {
+                return false;
+            }
+            const vshi_vec expected = vshi_add(p, vshi_add(vshi_scale(u, x), vshi_scale(v, y)));
+            const vshi_vec off = vshi_sub(vshi_vec_off(map->position + 3 * (at - 1)), expected);
+            if (!(vshi_dot(off, off) <= most)) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+bool vshi_links_lead(const vshi_texel_map *map, const int32_t from[2], const int32_t to[2]) {
+    float least = INFINITY, most = 0.0f;
+    int32_t at[2] = {from[0], from[1]};
+    size_t last = vshi_texel_at(map, at[0], at[1]);
+    while (at[0] != to[0] || at[1] != to[1]) {
+        const int axis = at[0] != to[0] ? 0 : 1;
+        at[axis] += to[axis] > at[axis] ? 1 : -1;
+        const size_t next = vshi_texel_at(map, at[0], at[1]);
+        const float step = step_of(map, last, next);
+        least = step < least ? step : least;
+        most = step > most ? step : most;
+        if (!(most < INFINITY)) {
+            return false;
+        }
+        last = next;
+    }
+    return !(most > LONG * least);
+}
+
+/* --- windows */
 
 enum { VALUES, VALUES_X, VALUES_Y, SQUARES, SPREADS, RAYS }; /* sums */
 
-/* Values and spreads in tables are multiples of these. */
+/* The tables hold values and spreads as multiples of these. */
 #define UNIT 0x1p-24
 #define SPREAD_UNIT 0x1p-40
 
-/* Columns and rows of a window; what a plane's values and slopes in it are divided by; how many values tell
- * of their noise. */
+/* Columns and rows of a window, the factors of its plane's value and slopes, and the degrees of freedom of
+ * its residual. */
 typedef struct window_size {
     int32_t columns, rows;
     double part, part_x, part_y, freedom;
@@ -19,9 +144,9 @@ typedef struct window_size {
 #define SIZE(a, b)                                                                                           \
     { a, b, 1.0 / ((a) * (b)), MOMENT(a, b), MOMENT(b, a), (a) * (b)-1.0 - ((a) > 1) - ((b) > 1) }
 
-/* Windows, one after the other: square, wide and tall. 8 × 8 is a tile; no wide or tall one is larger
- * than it. Larger ones than 11 × 11 lose by what bends in them: rooms' floors came
- * out darker by 0.006 with 13 × 13. */
+/* Chains of growing windows: square, wide and tall. 8 × 8 is a tile, and no wide or tall one is larger.
+ * Windows above 11 × 11 lose by the bend in them: with 13 × 13 the floors of rooms came out darker by
+ * 0.006. */
 enum { CHAINS = 3, LINKS = 7, TILE_LINK = 3 };
 static const window_size SIZES[CHAINS][LINKS] = {
     {SIZE(1, 1), SIZE(3, 3), SIZE(5, 5), SIZE(8, 8), SIZE(11, 11)},
@@ -29,20 +154,18 @@ static const window_size SIZES[CHAINS][LINKS] = {
     {SIZE(1, 1), SIZE(1, 3), SIZE(1, 5), SIZE(1, 8), SIZE(1, 11), SIZE(3, 11), SIZE(5, 11)},
 };
 
-/* Standard deviations of their difference that a window's estimate may be off the texel's own value, that of
- * the second and those of the others: one value in a hundred that is off by chance is a speck in the picture,
- * and in larger windows bias counts for more. */
+/* Standard deviations by which a window's estimate may differ from the texel's own value, of the second
+ * window and of the others. One wrong value in a hundred is a speck in the picture, and larger windows have
+ * more bias. */
 static const double SIGMAS[LINKS] = {3.0, 2.5, 2.0, 2.0, 2.0, 2.0, 2.0};
 
-/* Of them, where errors below this are asked for: noise is then so small that what bends is most of the
- * error. */
+/* Factor on SIGMAS for errors below FINE: noise is then so small that the bend is most of the error. */
 static const double FINE = 0.01, FINE_SIGMAS = 0.7;
 
-/* What estimates may differ by beside their noise, of max_error. */
+/* Estimates may also differ by this share of max_error. */
 static const double TOLERANCE = 0.1;
 
-/* A large square whose values vary no more than this over what they should holds nothing that a wide or tall
- * window would see better. */
+/* A large square window that varies no more than this over the expected noise needs no wide or tall ones. */
 static const double CALM = 1.5;
 
 typedef struct window {
@@ -51,18 +174,18 @@ typedef struct window {
     double mean;
     double value; /* the plane's at the texel */
     double slope[2];
-    double weight;   /* of the texels' variances in its own: the sum of squared weights */
-    double spread;   /* of a texel's value, on average, over p (1 - p) */
-    double residual; /* variance of a texel's value, by how far they lie from the plane; 0: too few */
+    double weight;   /* variance of the value over that of a texel: the sum of squared weights */
+    double spread;   /* mean variance of a texel's value, over p (1 - p) */
+    double residual; /* variance of a texel's value, by the distances from the plane; 0: too few texels */
     double rays;
-    int smaller; /* of the fits: the one two links before it, or the texel's own */
+    int smaller; /* number of the fit two links before, or of the texel's own */
 } window;
 
 static uint8_t one_more(uint8_t run) {
     return run < VSHI_WINDOW_REACH ? (uint8_t)(run + 1) : VSHI_WINDOW_REACH;
 }
 
-/* How far texels hang together: left and up, then right and down. */
+/* Counts linked texels: left and up, then right and down. */
 static void find_runs(const vshi_windows *w) {
     const size_t width = (size_t)w->width, height = (size_t)w->height;
     for (size_t y = 0; y < height; ++y) {
@@ -114,7 +237,7 @@ void vshi_windows_sum(vshi_windows *w) {
     }
 }
 
-/* So many texels that go to both sides where they can, else more to one; false where there are too few. */
+/* Places `size` texels around a texel, evenly if possible. False if there are too few. */
 static bool place(int32_t at, int32_t size, int32_t before, int32_t after, int32_t range[2]) {
     int32_t low = (size - 1) / 2, high = size - 1 - low;
     if (before < low) {
@@ -130,17 +253,12 @@ static bool place(int32_t at, int32_t size, int32_t before, int32_t after, int32
     return low <= before && high <= after;
 }
 
-/* Whether no step in a window is between texels that do not hang together. */
-static bool is_whole(const vshi_window_sums *top, const vshi_window_sums *bottom, const int32_t x[2]) {
-    return bottom[x[1] + 1].breaks - bottom[x[0] + 1].breaks == top[x[1] + 1].breaks - top[x[0] + 1].breaks;
-}
-
 /* The sum of values by their distance from the middle of a range of columns or rows. */
 static double moment(uint64_t by_place, uint64_t values, const int32_t range[2]) {
     return 0.5 * UNIT * (double)(int64_t)(2 * by_place - values * (uint64_t)(range[0] + range[1]));
 }
 
-/* A texel, and how far windows may go left, right, up and down from it. */
+/* A texel, and how far its windows may extend left, right, up and down. */
 typedef struct spot {
     int32_t x, y, run[4];
 } spot;
@@ -149,7 +267,7 @@ static int32_t lesser(int32_t a, int32_t b) {
     return a < b ? a : b;
 }
 
-static spot look_at(const vshi_windows *w, int32_t x, int32_t y, int32_t tile) {
+static spot find_spot(const vshi_windows *w, int32_t x, int32_t y, int32_t tile) {
     const uint8_t *run = w->texels[(size_t)y * (size_t)w->width + (size_t)x].run;
     spot at = {x, y, {run[0], run[1], run[2], run[3]}};
     if (tile > 0) {
@@ -161,7 +279,7 @@ static spot look_at(const vshi_windows *w, int32_t x, int32_t y, int32_t tile) {
     return at;
 }
 
-/* Fits the plane; false where there is no such window. */
+/* Fits the plane. False if there is no such window. */
 static bool fit(const vshi_windows *w, const spot *at, const window_size *size, window *f) {
     if (!place(at->x, size->columns, at->run[0], at->run[1], f->x) ||
         !place(at->y, size->rows, at->run[2], at->run[3], f->y)) {
@@ -170,8 +288,11 @@ static bool fit(const vshi_windows *w, const spot *at, const window_size *size, 
     const size_t stride = (size_t)w->width + 1;
     const vshi_window_sums *top = w->sums + (size_t)f->y[0] * stride,
                            *bottom = w->sums + ((size_t)f->y[1] + 1) * stride;
-    if (size->columns > 1 && size->rows > 1 && !is_whole(top + stride, bottom, f->x)) {
-        return false;
+    const vshi_window_sums *second = top + stride;
+    if (size->columns > 1 && size->rows > 1 &&
+        bottom[f->x[1] + 1].breaks - bottom[f->x[0] + 1].breaks !=
+            second[f->x[1] + 1].breaks - second[f->x[0] + 1].breaks) {
+        return false; /* a link is missing */
     }
     uint64_t sum[VSHI_WINDOW_SUMS];
     for (int s = 0; s < VSHI_WINDOW_SUMS; ++s) {
@@ -197,14 +318,14 @@ static bool fit(const vshi_windows *w, const spot *at, const window_size *size, 
     return true;
 }
 
-/* p (1 - p) of a share, by Laplace's rule of succession: that some rays agree does not mean that all do. */
+/* p (1 - p) of a share, by Laplace's rule of succession: a few agreeing rays do not prove that all agree. */
 static double variance_of(const window *f) {
     const double p = (f->value * f->rays + 1.0) / (f->rays + 2.0);
     return p * (1.0 - p);
 }
 
-/* How much more a window's values vary than rays that are spread evenly should: as much as they are seen to,
- * up to what random ones do. */
+/* The factor by which a window's values vary more than those of evenly spread rays: as measured, at most as
+ * random rays would. */
 static double wildness(const window *f, double variance) {
     const double expected = variance * f->spread;
     if (!(f->residual > expected)) {
@@ -215,7 +336,7 @@ static double wildness(const window *f, double variance) {
     return seen > expected ? seen / expected : 1.0;
 }
 
-/* Whether a window's value is that of a smaller one in it, but for noise. */
+/* Whether a window agrees with a smaller one in it, up to noise. */
 static bool agrees(const window *f, const window *smaller, double sigmas, double variance, double max_error) {
     const double off = fabs(f->value - smaller->value) - TOLERANCE * max_error;
     if (off <= 0.0) {
@@ -226,11 +347,11 @@ static bool agrees(const window *f, const window *smaller, double sigmas, double
     return off * off <= most || off * off <= most * wildness(f, variance);
 }
 
-/* Adds the windows of a chain that agree with those before them to fits, whose first is the texel's own;
- * returns how many of the chain do. */
+/* Adds the windows of a chain that agree with those before. fits[0] is the texel's own. Returns the number of
+ * links that agree. */
 static int widen(const vshi_windows *w, const spot *at, const window_size *sizes, double max_error,
                  window *fits, int *count) {
-    window *chain = fits + *count - 1; /* [link], but for the texel's own */
+    window *chain = fits + *count - 1; /* [link], except the texel's own */
     const double fine = max_error < FINE ? FINE_SIGMAS : 1.0;
     for (int link = 1; link < LINKS && sizes[link].columns > 0; ++link) {
         window *f = &chain[link];
@@ -250,7 +371,8 @@ static int widen(const vshi_windows *w, const spot *at, const window_size *sizes
     return LINKS;
 }
 
-/* The largest square window, where it and the texel are all free or all hidden: the smaller ones are too. */
+/* Finds the largest square window that is, like the texel, all free or all hidden. The smaller ones are too.
+ */
 static bool find_even(const vshi_windows *w, const spot *at, window *f) {
     const double value = (double)w->texels[(size_t)at->y * (size_t)w->width + (size_t)at->x].value;
     if (value != 0.0 && value != 1.0) {
@@ -263,7 +385,7 @@ static bool find_even(const vshi_windows *w, const spot *at, window *f) {
     return link >= TILE_LINK && f->mean == value;
 }
 
-/* The window of the least error. All by the p of the one that knows it best: a small window whose rays are
+/* The window of the least error. All are judged by the p of the best-known one: a small window whose rays are
  * all free by chance would seem to have no noise. */
 static const window *choose(const window *fits, int count, double *square) {
     const window *largest = fits, *best = fits;
@@ -283,17 +405,12 @@ static const window *choose(const window *fits, int count, double *square) {
     return best;
 }
 
-/* Windows are chosen that agree, so that their differences vary by no more than this of their noise. Random
- * rays leave so much of it that what bends hides in it, and more of their differences counts as bent. */
+/* Chosen windows agree, so their differences vary by this share of their noise. The bend hides in the noise
+ * of random rays, so more of their differences counts as bend. */
 static const double AGREEING = 0.75, RANDOM_AGREEING = 0.55, FINE_AGREEING = 0.5;
 
-/* Whether a window's rays are spread no more evenly than at random. */
-static bool is_random(const window *f) {
-    return f->spread * f->rays > 0.99 * f->size->columns * f->size->rows;
-}
-
-/* What bends grows with the square of a window's sides, so that two windows tell of it by what their values
- * differ beyond their noise. */
+/* The square of a window's bend. The bend grows with the square of the sides, so the differences of two
+ * windows beyond their noise show it. */
 static double find_curved(const window *fits, const window *best, double max_error) {
     const window *small = &fits[best->smaller];
     const double sides = best->size->columns * best->size->columns + best->size->rows * best->size->rows;
@@ -303,13 +420,14 @@ static double find_curved(const window *fits, const window *best, double max_err
         return 0.0;
     }
     const double noise = best->residual > 0.0 ? best->residual : variance_of(best) * best->spread;
-    const double agreeing = max_error < FINE ? FINE_AGREEING : is_random(best) ? RANDOM_AGREEING : AGREEING;
+    const bool random = best->spread * best->rays > 0.99 * best->size->columns * best->size->rows;
+    const double agreeing = max_error < FINE ? FINE_AGREEING : random ? RANDOM_AGREEING : AGREEING;
     return (off * off - agreeing * noise * (small->weight - best->weight)) / (part * part);
 }
 
 vshi_window_estimate vshi_windows_estimate(const vshi_windows *w, int32_t x, int32_t y, double max_error,
                                            int32_t tile) {
-    const spot at = look_at(w, x, y, tile);
+    const spot at = find_spot(w, x, y, tile);
     window fits[1 + CHAINS * (LINKS - 1)];
     int count = 1;
     fits[0].smaller = 0;

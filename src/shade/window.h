@@ -1,12 +1,11 @@
-/* Values of texels that are known with noise, and the best estimate of one from those around it.
+/* Links between neighbouring texels, and the best estimate of a noisy texel from those around it.
  *
- * Around a texel there are windows, rectangles of texels that hang together, of growing sizes: square, wide
- * and tall. In each a plane is fitted by least squares. A window's estimate has less noise the larger it is,
- * and is taken for as long as it agrees with those of the smaller ones in it to within their noise: local
- * polynomial approximation with the intersection of confidence intervals (Goldenshluger and Nemirovski, "On
- * spatially adaptive estimation of nonparametric regression", 1997; Katkovnik, "A new method for varying
- * adaptive bandwidth selection", 1999). Sums over windows are integers in summed-area tables (Crow, 1984), so
- * that no bit depends on where a table begins. */
+ * Around a texel there are windows: rectangles of linked texels, of growing sizes, square, wide and tall. In
+ * each, a plane is fitted by least squares. A larger window has less noise. It counts as long as it agrees
+ * with the smaller ones to within their noise: local polynomial approximation with the intersection of
+ * confidence intervals (Goldenshluger and Nemirovski, "On spatially adaptive estimation of nonparametric
+ * regression", 1997; Katkovnik, "A new method for varying adaptive bandwidth selection", 1999). Sums over
+ * windows are integers in summed-area tables (Crow, 1984), so no bit depends on where a table begins. */
 #ifndef VSHI_WINDOW_H
 #define VSHI_WINDOW_H
 
@@ -15,7 +14,7 @@
 #include <stdint.h>
 
 enum {
-    VSHI_WINDOW_REACH = 7, /* texels that a window goes beyond its texel at most */
+    VSHI_WINDOW_REACH = 7, /* texels that a window extends beyond its texel, at most */
     VSHI_WINDOW_SUMS = 6
 };
 
@@ -23,17 +22,55 @@ enum {
 typedef struct vshi_window_texel {
     float value;         /* 0 … 1 */
     float spread;        /* variance of a value near p, over p (1 - p) */
-    int32_t rays;        /* that it is of */
-    float step[2];       /* vshi_links_find()'s */
-    uint8_t left, above; /* 1 where it hangs together with the texel there; both have values */
-    uint8_t run[4];      /* texels that hang together left, right, up and down, VSHI_WINDOW_REACH at most: set
-                          * by vshi_windows_sum() */
+    int32_t rays;        /* behind the value */
+    float step[2];       /* world length of the step to the texel on the left, and above; INFINITY: no link */
+    uint8_t left, above; /* 1: linked to the texel there; both have values */
+    uint8_t run[4];      /* linked texels left, right, up and down, at most VSHI_WINDOW_REACH: set by
+                          * vshi_windows_sum() */
 } vshi_window_texel;
 
-/* Over all texels left of and above a corner. */
+/* --- links: which neighbouring texels lie next to each other in the world too */
+
+/* Texels [height][width] with their places and normals. */
+typedef struct vshi_texel_map {
+    int32_t width, height;
+    const uint32_t *at;    /* [height][width]: number of the texel's point, + 1; 0: none. NULL: points are
+                              numbered as texels */
+    const uint8_t *level;  /* without `at`, [height][width]: 0 if there is no point */
+    const float *position; /* [points][3], from any one place, world units */
+    const float *normal;   /* [points][3], unit */
+} vshi_texel_map;
+
+/* The number of a texel's point, + 1; 0: there is none. */
+static inline size_t vshi_texel_at(const vshi_texel_map *map, int32_t column, int32_t row) {
+    if (column < 0 || row < 0 || column >= map->width || row >= map->height) {
+        return 0;
+    }
+    const size_t place = (size_t)row * (size_t)map->width + (size_t)column;
+    return map->at != NULL ? map->at[place] : map->level[place] != 0 ? place + 1 : 0;
+}
+
+/* A rectangle of every `spacing`th texel of every `spacing`th row. */
+typedef struct vshi_texel_lattice {
+    int32_t left, top, spacing, width, height;
+} vshi_texel_lattice;
+
+/* Sets `left`, `above` and `step` of a lattice's texels [height][width]. Two of its texels are linked if all
+ * texels between them are. */
+void vshi_links_find(const vshi_texel_map *map, const vshi_texel_lattice *lattice, vshi_window_texel *texels);
+
+/* Whether the square of `spacing` + 1 texels from (column, row) on is complete and lies in a plane. */
+bool vshi_links_whole(const vshi_texel_map *map, int32_t column, int32_t row, int32_t spacing);
+
+/* Whether links lead from one texel to another, along the first one's row and then the other's column. */
+bool vshi_links_lead(const vshi_texel_map *map, const int32_t from[2], const int32_t to[2]);
+
+/* --- windows */
+
+/* Sums over all texels left of and above a corner. */
 typedef struct vshi_window_sums {
     uint64_t of[VSHI_WINDOW_SUMS];
-    uint32_t breaks; /* squares of 2 × 2 that do not hang together */
+    uint32_t breaks; /* squares of 2 × 2 texels that are not linked */
 } vshi_window_sums;
 
 /* A rectangle of texels. */
@@ -45,24 +82,24 @@ typedef struct vshi_windows {
 
 typedef struct vshi_window_estimate {
     double value;     /* 0 … 1 */
-    double deviation; /* its standard error */
-    double centred;   /* the same, were the texel in the middle of the window */
-    /* square of what bends in the window and is no plane, as by a smaller one: with the noise of its own,
-     * which is below zero as often as above, and means something only in sums over many texels */
+    double deviation; /* standard error of the value */
+    double centred;   /* standard error if the texel were in the middle of the window */
+    /* square of the bend that the plane misses, from a smaller window. It is noisy and often below zero, so
+     * only sums over many texels mean something */
     double curved;
-    double slope[2];    /* of the plane, a column and a row on */
+    double slope[2];    /* of the plane, for each column and row */
     int32_t x[2], y[2]; /* first and last column and row of the window */
 } vshi_window_estimate;
 
 /* Fills runs and sums. */
 void vshi_windows_sum(vshi_windows *windows);
 
-/* Of texel (x, y), which has rays. Estimates that differ by a tenth of `max_error` agree. Windows lie in the
- * square of `tile` texels that the texel is in, from a multiple of it on; 0: anywhere. */
+/* Estimates texel (x, y), which has rays. Estimates that differ by a tenth of `max_error` agree. Windows stay
+ * in the texel's square of `tile` × `tile` texels, aligned to multiples of `tile`; 0: anywhere. */
 vshi_window_estimate vshi_windows_estimate(const vshi_windows *windows, int32_t x, int32_t y,
                                            double max_error, int32_t tile);
 
-/* The weight of texel (column, row) in the estimate of texel (x, y) from a window. */
+/* The weight of texel (column, row) in a window's estimate of texel (x, y). */
 double vshi_window_weight(const vshi_window_estimate *estimate, int32_t x, int32_t y, int32_t column,
                           int32_t row);
 

@@ -1,29 +1,81 @@
+/* Builds Embree scenes of triangles. */
 #include "trace/embree_scene.h"
 
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "mesh/mesh.h"
 #include "mesh/mesh_set.h"
 #include "trace/solids.h"
 
+#include <dlfcn.h>
+#include <errno.h>
 #include <float.h>
+#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* A triangle's share of buffers and tree, bytes: 180 to 230 measured, more while the tree is made. */
+/* --- loading Embree. The library is not linked: names come from Embree's own file, so that functions of the
+ * same names in a host (a static Embree, Embree 4) and ours do not mix. */
+
+#define NAME(name) #name,
+static const char *const names[] = {VSHI_EMBREE_CALLS(NAME)};
+
+static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
+static vshi_embree calls;
+static _Atomic(const vshi_embree *) loaded;
+
+/* Loads Embree for as long as the process lives. */
+static vsh_result load_calls(vsh_error *error) {
+    errno = 0;
+    void *library = dlopen(VSH_EMBREE, RTLD_NOW | RTLD_LOCAL);
+    if (library == NULL && errno == ENOMEM) {
+        return vshi_fail(error, VSH_ERROR_MEMORY,
+                         "triangles: the system refused the memory that Embree takes");
+    }
+    unsigned char *call = (unsigned char *)&calls;
+    for (size_t i = 0; i < sizeof names / sizeof names[0]; ++i) {
+        void *found = library != NULL ? dlsym(library, names[i]) : NULL;
+        if (found == NULL) {
+            const char *why = dlerror();
+            return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                             "triangles: exact methods trace rays with Embree, which cannot be loaded: %s",
+                             why != NULL ? why : VSH_EMBREE);
+        }
+        memcpy(call + i * sizeof found, &found, sizeof found);
+    }
+    atomic_store_explicit(&loaded, &calls, memory_order_release);
+    return VSH_OK;
+}
+
+/* Errors: VSH_ERROR_UNSUPPORTED (Embree is missing), VSH_ERROR_MEMORY. */
+static vsh_result load_embree(const vshi_embree **embree, vsh_error *error) {
+    vsh_result result = VSH_OK;
+    *embree = atomic_load_explicit(&loaded, memory_order_acquire);
+    if (*embree == NULL) {
+        pthread_mutex_lock(&lock);
+        result = atomic_load_explicit(&loaded, memory_order_relaxed) == NULL ? load_calls(error) : VSH_OK;
+        *embree = atomic_load_explicit(&loaded, memory_order_relaxed);
+        pthread_mutex_unlock(&lock);
+    }
+    return result;
+}
+
+/* --- scenes */
+
+/* Bytes of a triangle in buffers and tree: 180 to 230 measured, more while the tree is built. */
 static const double TRIANGLE_BYTES = 300.0;
-/* A tree over a terrain of fewer triangles takes at most 200 MB, and up to a third less time a ray. */
+/* A terrain of fewer triangles becomes a tree of them, which takes at most 200 MB, and up to a third less
+ * time a ray. */
 enum { LEAST_TERRAIN = 1 << 19 };
-/* A terrain's sample's: it and the greatest of blocks. */
+/* Bytes of a terrain's sample, with its share of the blocks' maxima. */
 static const double SAMPLE_BYTES = 5.4;
-/* A quad's, likewise: 97 measured. */
+/* Bytes of a quad: 97 measured, more while the tree is built. */
 static const double QUAD_BYTES = 160.0;
 
 static bool watch_memory(void *user, ssize_t bytes, bool post) {
     (void)post;
-    vsh_triangles *triangles = user;
+    vshi_triangles *triangles = user;
     const long long held = atomic_fetch_add(&triangles->bytes, (long long)bytes) + (long long)bytes;
     if (bytes > 0 && triangles->limit > 0 && held > (long long)triangles->limit) {
         atomic_store(&triangles->refused, true);
@@ -32,16 +84,16 @@ static bool watch_memory(void *user, ssize_t bytes, bool post) {
     return true;
 }
 
-/* Also called while a tree is made, by any thread: a cancelled job ends it. Embree flushes denormals to zero
- * on the threads that build, which the host's callback must not see. */
+/* A cancelled job ends the build. Any thread may call this. Embree flushes denormals to zero on its threads,
+ * which the host's callback must not see. */
 static bool watch_progress(void *user, double fraction) {
     VSHI_FLOATS;
     (void)fraction;
     return !vshi_job_advance(user, 0);
 }
 
-/* The terrain that a mesh is; NULL: none. */
-static const vshi_terrain_part *terrain_of(const vsh_triangles *triangles, size_t mesh) {
+/* A mesh as a terrain; NULL if it is none. */
+static const vshi_terrain_part *find_terrain(const vshi_triangles *triangles, size_t mesh) {
     for (size_t k = 0; k < triangles->terrain_count; ++k) {
         if (triangles->terrains[k].mesh == mesh) {
             return &triangles->terrains[k];
@@ -50,8 +102,8 @@ static const vshi_terrain_part *terrain_of(const vsh_triangles *triangles, size_
     return NULL;
 }
 
-/* Centre and scale, from the box of all corners. */
-static void place(vsh_triangles *triangles, const double low[3], const double high[3]) {
+/* Sets centre and scale from the box of all corners. */
+static void set_scale(vshi_triangles *triangles, const double low[3], const double high[3]) {
     double half = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double side = 0.5 * high[axis] - 0.5 * low[axis];
@@ -66,23 +118,17 @@ static void place(vsh_triangles *triangles, const double low[3], const double hi
     triangles->size = 2.0 * half;
 }
 
-static void grow(double low[3], double high[3], const double at[3]) {
+static void measure(vshi_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count) {
+    double *low = triangles->low, *high = triangles->high;
     for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = at[axis] < low[axis] ? at[axis] : low[axis];
-        high[axis] = at[axis] > high[axis] ? at[axis] : high[axis];
+        low[axis] = DBL_MAX;
+        high[axis] = -DBL_MAX;
     }
-}
-
-static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mesh_count) {
-    double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
     for (size_t m = 0; m < mesh_count; ++m) {
-        const bool terrain = terrain_of(triangles, m) != NULL; /* which uses each of its vertices */
+        const bool terrain = find_terrain(triangles, m) != NULL; /* uses each vertex */
         const size_t corners = terrain ? meshes[m].vertex_count : 3 * meshes[m].triangle_count;
         for (size_t i = 0; i < corners; ++i) {
-            const size_t vertex = terrain ? i : meshes[m].indices[i];
-            const vshi_vec p =
-                vshi_transform_point(meshes[m].transform, vshi_vec_off(meshes[m].positions + 3 * vertex));
-            grow(low, high, (double[]){p.x, p.y, p.z});
+            vshi_grow_box(low, high, vshi_mesh_place(&meshes[m], terrain ? i : meshes[m].indices[i]));
         }
     }
     const size_t parts = triangles->solids != NULL ? vshi_solids_part_count(triangles->solids) : 0;
@@ -90,22 +136,19 @@ static void measure(vsh_triangles *triangles, const vsh_mesh *meshes, size_t mes
         double least[3], most[3];
         vshi_solids_part_box(triangles->solids, k, least, most);
         if (least[0] <= most[0]) {
-            grow(low, high, least);
-            grow(low, high, most);
+            vshi_grow_box_by(low, high, NULL, least, most);
         }
     }
-    memcpy(triangles->low, low, sizeof low);
-    memcpy(triangles->high, high, sizeof high);
-    place(triangles, low, high);
+    set_scale(triangles, low, high);
 }
 
-static void put(const vsh_triangles *triangles, vshi_vec world, float *out) {
+static void write_point(const vshi_triangles *triangles, vshi_vec world, float *out) {
     out[0] = (float)((world.x - triangles->centre[0]) * triangles->scale);
     out[1] = (float)((world.y - triangles->centre[1]) * triangles->scale);
     out[2] = (float)((world.z - triangles->centre[2]) * triangles->scale);
 }
 
-/* VSHI_SOLID_… of triangle i of a mesh, as its corners turn, also where the transform mirrors. */
+/* VSHI_SOLID_… of triangle i of a mesh, by its corners' order even if the transform mirrors. */
 static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint8_t *holed, size_t i) {
     const uint8_t side = holed[i] != VSHI_SIDE_SHEET ? holed[i] : sides[i];
     if (side == VSHI_SIDE_SHEET) {
@@ -119,8 +162,8 @@ static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint
                                                     : 0));
 }
 
-/* Finds the large terrains that are solid beneath, as they are unless a caller says otherwise. */
-static vsh_result find_terrains(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+/* Finds the large terrains that are solid beneath. */
+static vsh_result find_terrains(vshi_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&triangles->terrains, set->count, sizeof *triangles->terrains,
                            "triangles", error));
     for (size_t m = 0; m < set->count; ++m) {
@@ -137,37 +180,37 @@ static vsh_result find_terrains(vsh_triangles *triangles, const vshi_mesh_set *s
     return VSH_OK;
 }
 
-static vsh_result make_reliefs(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+static vsh_result make_reliefs(vshi_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
     for (size_t k = 0; k < triangles->terrain_count; ++k) {
         vshi_terrain_part *part = &triangles->terrains[k];
         const vsh_mesh *mesh = &set->meshes[part->mesh];
         vshi_relief *relief = &part->relief;
         VSHI_TRY(vshi_relief_create(mesh, part->grid, triangles->centre, triangles->scale, relief, error));
         const float *first = mesh->positions, *last = first + 3 * (part->grid.columns * part->grid.rows - 1);
-        for (int i = 0; i < 8; ++i) {
-            const vshi_vec local = {(double)(i & 1 ? last[0] : first[0]),
-                                    (double)(i & 2 ? relief->highest : relief->lowest),
-                                    (double)(i & 4 ? last[2] : first[2])};
-            put(triangles, vshi_transform_point(mesh->transform, local), part->corners[i]);
-        }
+        const double from[3] = {(double)first[0], (double)relief->lowest, (double)first[2]};
+        const double to[3] = {(double)last[0], (double)relief->highest, (double)last[2]};
+        double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
+        vshi_grow_box_by(low, high, mesh->transform, from, to);
+        write_point(triangles, vshi_vec_of(low), part->low);
+        write_point(triangles, vshi_vec_of(high), part->high);
     }
     return VSH_OK;
 }
 
-/* Vertices and triangles of a mesh's geometry: of a terrain those of its sides and bottom. */
-static size_t count_vertices(const vsh_triangles *triangles, const vsh_mesh *mesh, size_t m) {
-    const vshi_terrain_part *part = terrain_of(triangles, m);
+/* Vertices of a mesh's geometry: for a terrain its sides and bottom only. */
+static size_t count_vertices(const vshi_triangles *triangles, const vsh_mesh *mesh, size_t m) {
+    const vshi_terrain_part *part = find_terrain(triangles, m);
     return part == NULL ? mesh->vertex_count : 2 * vshi_terrain_edge_length(part->grid) + 1;
 }
 
-static size_t count_triangles(const vsh_triangles *triangles, const vshi_mesh_set *set, size_t m) {
-    const vshi_terrain_part *part = terrain_of(triangles, m);
+static size_t count_triangles(const vshi_triangles *triangles, const vshi_mesh_set *set, size_t m) {
+    const vshi_terrain_part *part = find_terrain(triangles, m);
     return part != NULL ? 3 * vshi_terrain_edge_length(part->grid)
                         : set->meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
 }
 
 /* Numbers the triangles of all geometries. */
-static vsh_result number_triangles(vsh_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
+static vsh_result number_triangles(vshi_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
     size_t count = 0;
     VSHI_TRY(vshi_allocate((void **)&triangles->first, set->count, sizeof(uint32_t), "triangles", error));
     for (size_t m = 0; m < set->count; ++m) {
@@ -185,7 +228,7 @@ static vsh_result number_triangles(vsh_triangles *triangles, const vshi_mesh_set
 }
 
 /* Writes the sides and the bottom of a terrain. */
-static void write_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_terrain grid, uint8_t *solid,
+static void write_sides(vshi_triangles *triangles, const vsh_mesh *mesh, vshi_terrain grid, uint8_t *solid,
                         float *vertices, uint32_t *corners) {
     const size_t edge = vshi_terrain_edge_length(grid), samples = grid.columns * grid.rows;
     const size_t first = 2 * (grid.columns - 1) * (grid.rows - 1);
@@ -194,12 +237,11 @@ static void write_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_ter
         uint32_t of[3];
         vshi_terrain_triangle(grid, first + i, of);
         const size_t next = (i / 3 + 1) % edge;
-        for (size_t k = 0; k < 3; ++k) { /* a sample of the edge, in the order of the sides, or the bottom */
+        for (size_t k = 0; k < 3; ++k) { /* first the edge's samples, then the bottom */
             const size_t place = of[k] >= samples       ? edge + of[k] - samples
                                  : i % 3 == 0 && k == 1 ? next
                                                         : i / 3;
-            const vshi_vec local = vshi_vec_off(mesh->positions + 3 * (size_t)of[k]);
-            put(triangles, vshi_transform_point(mesh->transform, local), vertices + 3 * place);
+            write_point(triangles, vshi_mesh_place(mesh, of[k]), vertices + 3 * place);
             corners[3 * i + k] = (uint32_t)place;
         }
         solid[i] = mirrored ? VSHI_SOLID_BEFORE : VSHI_SOLID_BEHIND;
@@ -207,15 +249,14 @@ static void write_sides(vsh_triangles *triangles, const vsh_mesh *mesh, vshi_ter
     triangles->has_solids = true;
 }
 
-/* Writes the vertices of a mesh, and its triangles that are not degenerate. */
-static void write_mesh(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m, uint8_t *solid,
+/* Writes the vertices and the triangles of a mesh, except for degenerate ones. */
+static void write_mesh(vshi_triangles *triangles, const vshi_mesh_set *set, size_t m, uint8_t *solid,
                        float *vertices, uint32_t *corners) {
     const vsh_mesh *mesh = &set->meshes[m];
     const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
     const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
-        const vshi_vec local = vshi_vec_off(mesh->positions + 3 * v);
-        put(triangles, vshi_transform_point(mesh->transform, local), vertices + 3 * v);
+        write_point(triangles, vshi_mesh_place(mesh, v), vertices + 3 * v);
     }
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
         if (vshi_mesh_degenerate(mesh, i)) {
@@ -231,8 +272,8 @@ static void write_mesh(vsh_triangles *triangles, const vshi_mesh_set *set, size_
     }
 }
 
-/* Geometry `m`, with that number; false where Embree refuses: its error says why. */
-static bool attach(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m) {
+/* Attaches mesh `m` as the geometry of that number; false if Embree fails, which keeps the reason. */
+static bool attach_mesh(vshi_triangles *triangles, const vshi_mesh_set *set, size_t m) {
     const vsh_mesh *mesh = &set->meshes[m];
     const size_t vertex_count = count_vertices(triangles, mesh, m),
                  count = count_triangles(triangles, set, m);
@@ -250,7 +291,7 @@ static bool attach(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m)
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), count);
     if (vertices != NULL && corners != NULL) {
         uint8_t *solid = triangles->solid + triangles->first[m];
-        const vshi_terrain_part *part = terrain_of(triangles, m);
+        const vshi_terrain_part *part = find_terrain(triangles, m);
         if (part != NULL) {
             write_sides(triangles, mesh, part->grid, solid, vertices, corners);
         } else {
@@ -264,26 +305,8 @@ static bool attach(vsh_triangles *triangles, const vshi_mesh_set *set, size_t m)
     return vertices != NULL && corners != NULL;
 }
 
-bool vshi_triangles_attach_own(const vsh_triangles *triangles, unsigned number, size_t count, void *user,
-                               RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
-                               RTCOccludedFunctionN occlude) {
-    const vshi_embree *embree = triangles->embree;
-    const RTCGeometry geometry = embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_USER);
-    if (geometry == NULL) {
-        return false;
-    }
-    embree->rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)count);
-    embree->rtcSetGeometryUserData(geometry, user);
-    embree->rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
-    embree->rtcSetGeometryIntersectFunction(geometry, intersect);
-    embree->rtcSetGeometryOccludedFunction(geometry, occlude);
-    embree->rtcCommitGeometry(geometry);
-    embree->rtcAttachGeometryByID(triangles->scene, geometry, number);
-    embree->rtcReleaseGeometry(geometry);
-    return true;
-}
-
-static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
+/* Fails with the reason that Embree, the limit or the job gives. */
+static vsh_result fail_build(const vshi_triangles *triangles, vshi_job *job, vsh_error *error) {
     const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
     if (atomic_load(&triangles->refused)) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: the memory limit of %.0f MB is passed",
@@ -292,22 +315,21 @@ static vsh_result refuse(const vsh_triangles *triangles, vshi_job *job, vsh_erro
     if (vshi_job_cancelled(job)) {
         return vshi_job_fail_cancelled(job, error);
     }
-    if (code == RTC_ERROR_OUT_OF_MEMORY ||
-        code == RTC_ERROR_NONE) { /* it forgets the reason in some places */
+    if (code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_NONE) { /* Embree loses some reasons */
         return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
     }
     return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
 }
 
-/* The tree is made on the pool's threads, as many as the arena around the call has. */
+/* Builds the tree on the threads of the arena around the call. */
 static void commit(void *user) {
-    const vsh_triangles *triangles = user;
+    const vshi_triangles *triangles = user;
     triangles->embree->rtcCommitScene(triangles->scene);
 }
 
-/* An empty scene. */
-static vsh_result begin(vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
-    VSHI_TRY(vshi_embree_load(&triangles->embree, error));
+/* Makes an empty scene. */
+static vsh_result begin_scene(vshi_triangles *triangles, vshi_job *job, vsh_error *error) {
+    VSHI_TRY(load_embree(&triangles->embree, error));
     triangles->device = triangles->embree->rtcNewDevice(NULL);
     if (triangles->device == NULL) {
         const enum RTCError code = triangles->embree->rtcGetDeviceError(NULL);
@@ -321,7 +343,7 @@ static vsh_result begin(vsh_triangles *triangles, vshi_job *job, vsh_error *erro
     triangles->embree->rtcSetDeviceMemoryMonitorFunction(triangles->device, watch_memory, triangles);
     triangles->scene = triangles->embree->rtcNewScene(triangles->device);
     if (triangles->scene == NULL) {
-        return refuse(triangles, job, error);
+        return fail_build(triangles, job, error);
     }
     triangles->embree->rtcSetSceneFlags(triangles->scene,
                                         RTC_SCENE_FLAG_ROBUST | RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION);
@@ -329,8 +351,7 @@ static vsh_result begin(vsh_triangles *triangles, vshi_job *job, vsh_error *erro
     return VSH_OK;
 }
 
-/* Makes the tree. */
-static vsh_result finish(vsh_triangles *triangles, vshi_job *job, vsh_error *error) {
+static vsh_result build_tree(vshi_triangles *triangles, vshi_job *job, vsh_error *error) {
     const vsh_result result = vshi_parallel_call(job, commit, triangles, error);
     triangles->embree->rtcSetSceneProgressMonitorFunction(triangles->scene, NULL, NULL);
     if (result != VSH_OK) {
@@ -341,40 +362,41 @@ static vsh_result finish(vsh_triangles *triangles, vshi_job *job, vsh_error *err
     }
     const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
     if (code != RTC_ERROR_NONE || atomic_load(&triangles->refused)) {
-        return refuse(triangles, job, error);
+        return fail_build(triangles, job, error);
     }
     return VSH_OK;
 }
 
-static vsh_result build(vsh_triangles *triangles, const vshi_mesh_set *set, vshi_job *job, vsh_error *error) {
-    VSHI_TRY(begin(triangles, job, error));
+static vsh_result build(vshi_triangles *triangles, const vshi_mesh_set *set, vshi_job *job,
+                        vsh_error *error) {
+    VSHI_TRY(begin_scene(triangles, job, error));
     VSHI_TRY(number_triangles(triangles, set, error));
     for (size_t m = 0; m < set->count; ++m) {
-        if (!attach(triangles, set, m)) {
-            return refuse(triangles, job, error);
+        if (!attach_mesh(triangles, set, m)) {
+            return fail_build(triangles, job, error);
         }
         if (vshi_job_advance(job, 0)) {
             return vshi_job_fail_cancelled(job, error);
         }
     }
     for (size_t k = 0; k < triangles->terrain_count; ++k) {
-        if (!vshi_terrain_attach(triangles, k)) {
-            return refuse(triangles, job, error);
+        if (!vshi_triangles_attach_terrain(triangles, k)) {
+            return fail_build(triangles, job, error);
         }
     }
     if (triangles->solids != NULL && !vshi_triangles_attach_solids(triangles)) {
-        return refuse(triangles, job, error);
+        return fail_build(triangles, job, error);
     }
-    VSHI_TRY(finish(triangles, job, error));
+    VSHI_TRY(build_tree(triangles, job, error));
     return vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
 }
 
-static vsh_result build_quads(vsh_triangles *triangles, const vshi_quads *quads, vshi_job *job,
+static vsh_result build_quads(vshi_triangles *triangles, const vshi_quads *quads, vshi_job *job,
                               vsh_error *error) {
-    VSHI_TRY(begin(triangles, job, error));
+    VSHI_TRY(begin_scene(triangles, job, error));
     const RTCGeometry geometry = triangles->embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_QUAD);
     if (geometry == NULL) {
-        return refuse(triangles, job, error);
+        return fail_build(triangles, job, error);
     }
     float *corners = triangles->embree->rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), quads->corner_count);
@@ -383,44 +405,44 @@ static vsh_result build_quads(vsh_triangles *triangles, const vshi_quads *quads,
     vsh_result result =
         corners != NULL && indices != NULL
             ? quads->write(quads->user, triangles->centre, triangles->scale, corners, indices, error)
-            : refuse(triangles, job, error);
+            : fail_build(triangles, job, error);
     if (result == VSH_OK) {
         triangles->embree->rtcCommitGeometry(geometry);
-        /* quads of one size: rays are as fast as through a tree that takes twice the time to make */
+        /* for quads of one size, rays are as fast as with the better quality, which takes twice the time */
         triangles->embree->rtcSetSceneBuildQuality(triangles->scene, RTC_BUILD_QUALITY_LOW);
         triangles->embree->rtcAttachGeometry(triangles->scene, geometry);
-        result = finish(triangles, job, error);
+        result = build_tree(triangles, job, error);
     }
     triangles->embree->rtcReleaseGeometry(geometry);
     return result;
 }
 
 vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, double held, vshi_job *job,
-                                   vsh_triangles **triangles, vsh_error *error) {
+                                   vshi_triangles **triangles, vsh_error *error) {
     *triangles = NULL;
     const double bytes = 12.0 * (double)quads->corner_count + QUAD_BYTES * (double)quads->quad_count;
     VSHI_TRY(vshi_check_limit(run, held + bytes, "surface", error));
-    vsh_triangles *made;
+    vshi_triangles *made;
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "surface", error));
     made->limit = run->memory_limit;
     made->fine = true;
-    place(made, quads->low, quads->high);
+    set_scale(made, quads->low, quads->high);
     const vsh_result result = build_quads(made, quads, job, error);
     if (result != VSH_OK) {
-        vsh_triangles_free(made);
+        vshi_triangles_free(made);
         return result;
     }
     *triangles = made;
     return VSH_OK;
 }
 
-vsh_result vsh_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
-                                vsh_triangles **triangles, vsh_error *error) {
-    return vsh_triangles_create_beside(meshes, mesh_count, NULL, run, triangles, error);
+vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                 vshi_triangles **triangles, vsh_error *error) {
+    return vshi_triangles_create_beside(meshes, mesh_count, NULL, run, triangles, error);
 }
 
-vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count, const vsh_solids *solids,
-                                       const vsh_run *run, vsh_triangles **triangles, vsh_error *error) {
+vsh_result vshi_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count, const vshi_solids *solids,
+                                        const vsh_run *run, vshi_triangles **triangles, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(triangles);
     *triangles = NULL;
@@ -428,7 +450,7 @@ vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vshi_mesh_set set;
-    vsh_triangles *made = NULL;
+    vshi_triangles *made = NULL;
     vshi_job *job = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
@@ -439,7 +461,7 @@ vsh_result vsh_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count
     for (size_t m = 0; m < mesh_count; ++m) {
         const double vertices = (double)count_vertices(made, &set.meshes[m], m);
         const double faces = (double)count_triangles(made, &set, m);
-        const vshi_terrain_part *part = terrain_of(made, m);
+        const vshi_terrain_part *part = find_terrain(made, m);
         bytes += 12.0 * vertices + TRIANGLE_BYTES * faces +
                  (part != NULL ? SAMPLE_BYTES * (double)meshes[m].vertex_count : 0.0);
     }
@@ -459,23 +481,23 @@ done:
     vshi_job_end(job);
     vshi_mesh_set_free(&set);
     if (result != VSH_OK) {
-        vsh_triangles_free(made);
+        vshi_triangles_free(made);
         made = NULL;
     }
     *triangles = made;
     return result;
 }
 
-void vshi_triangles_own_solids(vsh_triangles *triangles) {
+void vshi_triangles_own_solids(vshi_triangles *triangles) {
     triangles->owns_solids = true;
 }
 
-void vsh_triangles_free(vsh_triangles *triangles) {
+void vshi_triangles_free(vshi_triangles *triangles) {
     if (triangles == NULL) {
         return;
     }
     if (triangles->owns_solids) {
-        vsh_solids_free((vsh_solids *)(uintptr_t)triangles->solids);
+        vshi_solids_free((vshi_solids *)(uintptr_t)triangles->solids);
     }
     if (triangles->scene != NULL) {
         triangles->embree->rtcReleaseScene(triangles->scene);
@@ -493,7 +515,7 @@ void vsh_triangles_free(vsh_triangles *triangles) {
     free(triangles);
 }
 
-uint64_t vsh_triangles_bytes(const vsh_triangles *triangles) {
+uint64_t vshi_triangles_bytes(const vshi_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
     size_t reliefs = 0;
     for (size_t k = 0; k < triangles->terrain_count; ++k) {

@@ -1,10 +1,9 @@
-/* Packets of rays of points that lie near each other, over a disc, or a dome, that each of them sees.
+/* Packets of rays of neighbouring points, each over its own disc or dome.
  *
- * The points on the disc are those of one net, whose digits each texel shifts by its own (sampler.h). In a
- * block of 2^k points of it there is one in each of 2^k cells of the square; a shift permutes the cells. So
- * each texel has one ray in any cell, and a packet is made of those of one cell: they go the same way. On
- * lobes of 50,000 triangles, under a sun of 30°, a ray takes 24 ns so, and 52 where packets follow the index.
- */
+ * All discs use the points of one net; each texel shifts their digits (sampler.h). A block of 2^k points has
+ * one point in each of 2^k cells of the square; a shift permutes the cells. So each texel has one ray in any
+ * cell, and the rays of one cell, which have similar directions, make a packet. On lobes of 50,000 triangles,
+ * under a sun of 30°, a ray takes 24 ns; with packets in the order of the index it takes 52 ns. */
 #include "trace/embree_scene.h"
 
 #include <float.h>
@@ -14,19 +13,19 @@ enum { LANES = VSHI_PACKET };
 
 static const float QUARTER = 0.78539816339744831f; /* π / 4 */
 
-/* A packet's discs: all that is the same for all of their rays. */
+/* A packet's discs: the data that all of their rays share. */
 typedef struct group {
     struct RTCRay16 ray;
     float axis[3][LANES], u[3][LANES], v[3][LANES], normal[3][LANES], far[LANES];
     float rise[LANES], lean[2][LANES]; /* of domes: vshi_lean */
-    bool leans;                        /* any of them */
+    bool leans;                        /* any dome does */
     uint32_t shift[2][LANES];
-    float lowest[LANES]; /* of a ray along its normal, below it */
+    float lowest[LANES]; /* least component along the normal: 0, or -∞ without a horizon */
     int valid[LANES];    /* -1: the lane has a disc */
     int used;            /* discs */
 } group;
 
-static void set_lane(const vsh_triangles *t, const vshi_disc *disc, int lane, group *g) {
+static void set_lane(const vshi_triangles *t, const vshi_disc *disc, int lane, group *g) {
     float *const from[3] = {g->ray.org_x, g->ray.org_y, g->ray.org_z};
     const double axis[3] = {disc->axis.x, disc->axis.y, disc->axis.z};
     const double u[3] = {disc->u.x, disc->u.y, disc->u.z}, v[3] = {disc->v.x, disc->v.y, disc->v.z};
@@ -50,8 +49,8 @@ static void set_lane(const vsh_triangles *t, const vshi_disc *disc, int lane, gr
     g->ray.mask[lane] = 0xffffffffu;
 }
 
-/* The places of a packet on the unit disc (Shirley and Chiu, "A low distortion map between disk and square",
- * 1997); angles by series that are exact to 4e-7. */
+/* Maps digits to the unit disc (Shirley and Chiu, "A low distortion map between disk and square", 1997). The
+ * series for angles are exact to 4e-7. */
 static inline void to_disc(uint32_t digits[2][LANES], float x[LANES], float y[LANES]) {
     for (int l = 0; l < LANES; ++l) {
         const float a = (float)(int32_t)(digits[0][l] ^ 0x80000000u) * 0x1p-31f;
@@ -67,7 +66,7 @@ static inline void to_disc(uint32_t digits[2][LANES], float x[LANES], float y[LA
     }
 }
 
-/* Aims the lanes at places of their discs; a ray below its disc's horizon is not valid. */
+/* Aims the lanes at places of their discs. A ray below its disc's horizon is not valid. */
 static inline void aim_at_discs(group *g, const float x[LANES], const float y[LANES], int valid[LANES]) {
     struct RTCRay16 *r = &g->ray;
     for (int l = 0; l < LANES; ++l) {
@@ -111,9 +110,9 @@ static inline void aim_at_domes(group *g, float x[LANES], float y[LANES], int va
     }
 }
 
-/* Traces a block of `size` points of the net, in the order of its cells, for a group: 2^each lanes have a
- * disc each, and as many the same in the next cell, and so on. */
-static void trace(const vsh_triangles *t, const uint32_t (*points)[2], bool domes, group *g, int each,
+/* Traces a block of `size` points of the net for a group, in the order of the cells. The first 2^each lanes
+ * have a disc each; the next 2^each have the same discs in the next cell, and so on. */
+static void trace(const vshi_triangles *t, const uint32_t (*points)[2], bool domes, group *g, int each,
                   uint32_t size, int32_t *lit) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -143,7 +142,7 @@ static void trace(const vsh_triangles *t, const uint32_t (*points)[2], bool dome
         memcpy(g->ray.tfar, g->far, sizeof g->far);
         vshi_triangles_occlude(t, valid, &context, &g->ray);
         for (int l = 0; l < LANES; ++l) {
-            seen[l] += valid[l] & (g->ray.tfar[l] >= 0.0f); /* of those that meet something it is -∞ */
+            seen[l] += valid[l] & (g->ray.tfar[l] >= 0.0f); /* -∞ if the ray meets something */
         }
     }
     for (int l = 0; l < LANES; ++l) {
@@ -153,7 +152,7 @@ static void trace(const vsh_triangles *t, const uint32_t (*points)[2], bool dome
     }
 }
 
-bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3]) {
+bool vshi_triangles_sees(const vshi_triangles *triangles, const double origin[3]) {
     double distance = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         const double at = (origin[axis] - triangles->centre[axis]) * triangles->scale;
@@ -162,7 +161,7 @@ bool vshi_triangles_sees(const vsh_triangles *triangles, const double origin[3])
     return distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
 }
 
-void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sampler, bool domes,
+void vshi_triangles_discs(const vshi_triangles *triangles, const vshi_sampler *sampler, bool domes,
                           const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit) {
     for (size_t begin = 0; begin < count; begin += LANES) {
         group g = {.used = count - begin < LANES ? (int)(count - begin) : LANES};
@@ -174,7 +173,8 @@ void vshi_triangles_discs(const vsh_triangles *triangles, const vshi_sampler *sa
             const int k = l & ((1 << each) - 1);
             set_lane(triangles, &discs[begin + (size_t)(k < g.used ? k : 0)], l, &g);
         }
-        /* blocks of the net: the first of VSHI_SAMPLER_BLOCK, each further one as many as all before it */
+        /* blocks of the net: the first has VSHI_SAMPLER_BLOCK points, each further one as many as all before
+         */
         for (int32_t at = first; at < last;) {
             const int32_t size = at == 0 ? VSHI_SAMPLER_BLOCK : at;
             trace(triangles, vshi_sampler_cells(sampler, (uint32_t)at), domes, &g, each, (uint32_t)size,

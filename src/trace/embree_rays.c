@@ -1,12 +1,17 @@
-/* Rays against the triangles of a vsh_triangles: whether they meet any. */
+/* Rays against the triangles of a vshi_triangles. */
 #include "trace/embree_scene.h"
 
 #include <float.h>
 #include <string.h>
 
-static const double COHERENT = 0.9; /* cosine between a packet's rays, at least */
+/* Share of the casters' size by which rays begin off a surface: 64 times a float's rounding of their
+ * positions. */
+static const double LIFT = 0x1p-18;
 
-bool vshi_rays_together(const vshi_segment_ray *rays, int count) {
+static const double COHERENT = 0.9; /* least cosine between a packet's rays */
+
+/* Whether rays have similar directions. */
+static bool go_together(const vshi_segment_ray *rays, int count) {
     for (int i = 1; i < count; ++i) {
         const double *a = rays[0].direction, *b = rays[i].direction;
         if (!(a[0] * b[0] + a[1] * b[1] + a[2] * b[2] > COHERENT)) {
@@ -16,11 +21,11 @@ bool vshi_rays_together(const vshi_segment_ray *rays, int count) {
     return true;
 }
 
-/* Moves a ray that begins far away up to the scene; false where it passes it by, or ends before it. Rounding
- * leaves each move as far off as a double is at that distance, so that the next one begins from there. */
+/* Moves a far ray's origin up to the scene; false if the ray misses the scene, or ends before it. Each move
+ * has the rounding of a double at its distance, so the next move starts again from there. */
 static bool approach(double origin[3], const double direction[3], double *far) {
     enum { MOVES = 24 };                /* 1e308 by 1e15 a move */
-    static const double MOVED = 0x1p-6; /* what is left of a move that needs no other */
+    static const double MOVED = 0x1p-6; /* no further move if the last one was shorter */
     for (int move = 0; move < MOVES; ++move) {
         double distance = 0.0, along = 0.0;
         for (int axis = 0; axis < 3; ++axis) {
@@ -35,8 +40,7 @@ static bool approach(double origin[3], const double direction[3], double *far) {
             return false;
         }
         if (!(skip > (move == 0 ? 0.0 : MOVED))) {
-            /* the scene is in the ball of √3 around 0: what is this far beside or behind it does not meet it
-             */
+            /* the scene is in the ball of √3 around 0 */
             return distance <= 2.0 * VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
         }
         for (int axis = 0; axis < 3; ++axis) {
@@ -47,8 +51,9 @@ static bool approach(double origin[3], const double direction[3], double *far) {
     return false;
 }
 
-bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay16 *packet,
-                        int lane) {
+/* Sets lane `lane` of a packet of zeros, in the scene's units; false if the ray ends before the scene. */
+static bool aim(const vshi_triangles *triangles, const vshi_segment_ray *ray, struct RTCRay16 *packet,
+                int lane) {
     double origin[3], far = ray->far * triangles->scale;
     for (int axis = 0; axis < 3; ++axis) {
         origin[axis] = (ray->origin[axis] - triangles->centre[axis]) * triangles->scale;
@@ -62,15 +67,12 @@ bool vshi_triangles_aim(const vsh_triangles *triangles, const vshi_segment_ray *
     packet->dir_x[lane] = (float)ray->direction[0];
     packet->dir_y[lane] = (float)ray->direction[1];
     packet->dir_z[lane] = (float)ray->direction[2];
-    packet->tnear[lane] = 0.0f;
-    packet->time[lane] = 0.0f;
     packet->tfar[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
     packet->mask[lane] = 0xffffffffu;
-    packet->flags[lane] = 0;
     return true;
 }
 
-/* Half of a packet, a row of VSHI_PACKET values after the other. */
+/* Copies half of a packet, row by row of VSHI_PACKET values. */
 static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *part) {
     const float *from = whole->org_x;
     float *to = part->org_x;
@@ -79,7 +81,7 @@ static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *pa
     }
 }
 
-void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
+void vshi_triangles_occlude(const vshi_triangles *triangles, const int *valid,
                             struct RTCIntersectContext *context, struct RTCRay16 *packet) {
     if (triangles->wide) {
         triangles->embree->rtcOccluded16(valid, triangles->scene, context, packet);
@@ -93,41 +95,54 @@ void vshi_triangles_occlude(const vsh_triangles *triangles, const int *valid,
     }
 }
 
-/* A context of Embree's, and what a filter is to know. */
-typedef struct blocking {
-    struct RTCIntersectContext context; /* first: the filter is given this */
-    const vsh_triangles *triangles;
-} blocking;
+typedef struct crossing {
+    float distance;
+    int8_t out; /* 1: out of a solid, -1: into one */
+} crossing;
 
-static void find_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+/* A context of Embree's, and data for its filter. */
+typedef struct query {
+    struct RTCIntersectContext context; /* first: the filter gets its address */
+    const vshi_triangles *triangles;
+    bool vessels; /* of pass_sheets(): rays meet vessels, too */
+    size_t count;
+    crossing *crossings; /* of pass_sheets(); NULL: only the first is wanted */
+} query;
+
+static query begin_query(const vshi_triangles *triangles, RTCFilterFunctionN filter) {
+    query q = {.triangles = triangles};
+    rtcInitIntersectContext(&q.context);
+    q.context.filter = filter;
+    return q;
+}
+
+static void find_blocked(const vshi_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                          RTCFilterFunctionN filter, bool *blocked) {
-    blocking look = {.triangles = triangles};
-    rtcInitIntersectContext(&look.context);
-    look.context.filter = filter;
+    query q = begin_query(triangles, filter);
     for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
         struct RTCRay16 packet = {0};
         _Alignas(64) int valid[VSHI_PACKET] = {0};
         const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
         for (int lane = 0; lane < lanes; ++lane) {
-            valid[lane] = vshi_triangles_aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
+            valid[lane] = aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
         }
-        look.context.flags = vshi_triangles_flags(triangles, vshi_rays_together(rays + begin, lanes));
-        vshi_triangles_occlude(triangles, valid, &look.context, &packet);
+        q.context.flags = vshi_triangles_flags(triangles, go_together(rays + begin, lanes));
+        vshi_triangles_occlude(triangles, valid, &q.context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
         }
     }
 }
 
-void vshi_triangles_blocked(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+void vshi_triangles_blocked(const vshi_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                             bool *blocked) {
     find_blocked(triangles, rays, count, NULL, blocked);
 }
 
-/* An Embree filter: lets rays pass the fronts of triangles. A solid's faces look away from it, also where a
- * transform mirrors them; those of sheets look as their corners turn. */
+/* An Embree filter: lets rays pass the fronts of triangles. A solid's faces look away from it, even if a
+ * transform mirrors them; the corners' order decides for sheets. */
 static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
-    const vsh_triangles *triangles = ((const blocking *)args->context)->triangles;
+    const vshi_triangles *triangles = ((const query *)args->context)->triangles;
     const size_t n = args->N;
     const float *ray = (const float *)args->ray, *hit = (const float *)args->hit;
     const unsigned *of = (const unsigned *)args->hit;
@@ -148,7 +163,157 @@ static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
     }
 }
 
-void vshi_triangles_meet_backs(const vsh_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+void vshi_triangles_meet_backs(const vshi_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                                bool *met) {
     find_blocked(triangles, rays, count, pass_fronts, met);
+}
+
+/* --- rays that find solids: which side of a triangle they meet, and how often they cross one */
+
+/* Most crossings of one ray that are recorded. */
+enum { MOST_CROSSINGS = 256 };
+
+/* 1 if a ray of this direction leaves the solid of a triangle with this normal, -1 if it enters it, 0 for a
+ * sheet. */
+static int8_t crosses(uint8_t solid, vshi_vec normal, vshi_vec direction) {
+    if ((solid & VSHI_SOLID_SIDE) == VSHI_AIR_AROUND) {
+        return 0;
+    }
+    const bool forwards = vshi_dot(normal, direction) > 0.0;
+    return forwards == ((solid & VSHI_SOLID_SIDE) == VSHI_SOLID_BEHIND) ? 1 : -1;
+}
+
+/* An Embree filter: lets rays pass sheets. If all crossings are wanted, records each and goes on. */
+static void pass_sheets(const struct RTCFilterFunctionNArguments *args) {
+    query *q = (query *)args->context;
+    const size_t n = args->N;
+    const float *ray = (const float *)args->ray;
+    const unsigned *hit = (const unsigned *)args->hit;
+    for (size_t i = 0; i < n; ++i) {
+        if (args->valid[i] != -1) {
+            continue;
+        }
+        const uint8_t solid =
+            vshi_triangles_solid(q->triangles, hit[VSHI_HIT_MESH * n + i], hit[VSHI_HIT_TRIANGLE * n + i]);
+        const int8_t out = crosses(solid, vshi_packet_vector(args->hit, VSHI_HIT_NORMAL, n, i),
+                                   vshi_packet_vector(ray, VSHI_RAY_DIRECTION, n, i));
+        const bool vessel = (solid & VSHI_SOLID_VESSEL) != 0;
+        const bool sheet = vessel ? !q->vessels : solid == VSHI_AIR_AROUND;
+        if (sheet || q->crossings != NULL) {
+            args->valid[i] = 0;
+        }
+        if (!sheet && q->crossings != NULL && q->count < MOST_CROSSINGS) {
+            q->crossings[q->count++] = (crossing){ray[VSHI_RAY_FAR * n + i], out};
+        }
+    }
+}
+
+/* VSHI_MEETS_… of a traced ray. */
+static uint8_t find_met(const vshi_triangles *triangles, const struct RTCRayHit *ray) {
+    const struct RTCHit *hit = &ray->hit;
+    if (hit->geomID == RTC_INVALID_GEOMETRY_ID) {
+        return VSHI_MEETS_NOTHING;
+    }
+    const uint8_t solid = vshi_triangles_solid(triangles, hit->geomID, hit->primID);
+    const vshi_vec normal = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
+    const vshi_vec direction = {(double)ray->ray.dir_x, (double)ray->ray.dir_y, (double)ray->ray.dir_z};
+    const bool out = crosses(solid, normal, direction) > 0;
+    return !out ? VSHI_MEETS_AIR : (solid & VSHI_SOLID_HOLED) != 0 ? VSHI_MEETS_HOLED : VSHI_MEETS_SOLID;
+}
+
+/* Traces a lone ray. Its hit has no geometry if it meets nothing. */
+static struct RTCRayHit trace_lone(const vshi_triangles *triangles, const vshi_segment_ray *ray,
+                                   struct RTCIntersectContext *context) {
+    struct RTCRayHit lone = {.hit = {.geomID = RTC_INVALID_GEOMETRY_ID}};
+    struct RTCRay16 aimed;
+    if (aim(triangles, ray, &aimed, 0)) {
+        lone.ray = (struct RTCRay){.org_x = aimed.org_x[0],
+                                   .org_y = aimed.org_y[0],
+                                   .org_z = aimed.org_z[0],
+                                   .dir_x = aimed.dir_x[0],
+                                   .dir_y = aimed.dir_y[0],
+                                   .dir_z = aimed.dir_z[0],
+                                   .tfar = aimed.tfar[0],
+                                   .mask = 0xffffffffu};
+        triangles->embree->rtcIntersect1(triangles->scene, context, &lone);
+    }
+    return lone;
+}
+
+/* Traces ray by ray: where solids touch, two faces lie at one place, and the one that a packet finds depends
+ * on its other rays. */
+void vshi_triangles_meet(const vshi_triangles *triangles, const vshi_segment_ray *rays, size_t count,
+                         uint8_t *meets) {
+    query q = begin_query(triangles, pass_sheets);
+    for (size_t i = 0; i < count; ++i) {
+        const struct RTCRayHit lone = trace_lone(triangles, &rays[i], &q.context);
+        meets[i] = find_met(triangles, &lone);
+    }
+}
+
+bool vshi_triangles_meet_inner(const vshi_triangles *triangles, const vshi_segment_ray *ray) {
+    query q = begin_query(triangles, pass_sheets);
+    q.vessels = true;
+    const struct RTCRayHit lone = trace_lone(triangles, ray, &q.context);
+    return find_met(triangles, &lone) >= VSHI_MEETS_SOLID;
+}
+
+/* Whether a crossing comes before another. At one place entering comes first, whatever order Embree finds
+ * them in. */
+static bool comes_before(crossing a, crossing b) {
+    return a.distance < b.distance || (a.distance == b.distance && a.out < b.out);
+}
+
+/* By insertion, as crossings are few. */
+static void sort_crossings(crossing *crossings, size_t count) {
+    for (size_t i = 1; i < count; ++i) {
+        const crossing moved = crossings[i];
+        size_t k = i;
+        for (; k > 0 && comes_before(moved, crossings[k - 1]); --k) {
+            crossings[k] = crossings[k - 1];
+        }
+        crossings[k] = moved;
+    }
+}
+
+int vshi_triangles_depth(const vshi_triangles *triangles, const vshi_segment_ray *ray) {
+    crossing crossings[MOST_CROSSINGS];
+    query q = begin_query(triangles, pass_sheets);
+    q.crossings = crossings;
+    trace_lone(triangles, ray, &q.context);
+    sort_crossings(crossings, q.count);
+    int left = 0, most = 0;
+    for (size_t i = 0; i < q.count; ++i) {
+        left += crossings[i].out;
+        most = left > most ? left : most;
+    }
+    return most;
+}
+
+double vshi_triangles_distance(const vshi_triangles *triangles, const vshi_segment_ray *ray) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    const struct RTCRayHit lone = trace_lone(triangles, ray, &context);
+    return lone.hit.geomID != RTC_INVALID_GEOMETRY_ID ? (double)lone.ray.tfar / triangles->scale : ray->far;
+}
+
+bool vshi_triangles_have_solids(const vshi_triangles *triangles) {
+    return triangles->has_solids;
+}
+
+bool vshi_triangles_have_holes(const vshi_triangles *triangles) {
+    return triangles->has_holes;
+}
+
+bool vshi_triangles_have_vessels(const vshi_triangles *triangles) {
+    return triangles->has_vessels;
+}
+
+void vshi_triangles_bounds(const vshi_triangles *triangles, double low[3], double high[3]) {
+    memcpy(low, triangles->low, sizeof triangles->low);
+    memcpy(high, triangles->high, sizeof triangles->high);
+}
+
+double vshi_triangles_lift(const vshi_triangles *triangles) {
+    return LIFT * triangles->size;
 }

@@ -9,9 +9,9 @@ enum { MASK_EDGE = 64, CANDIDATES = 32 };
 struct vshi_sampler {
     int32_t kind;
     int32_t frame;
-    int32_t count;                    /* of points */
-    uint32_t (*net)[2];               /* sobol, */
-    uint32_t (*cells)[2];             /* and each block of it in the order of its cells */
+    int32_t count;                    /* points */
+    uint32_t (*net)[2];               /* sobol */
+    uint32_t (*cells)[2];             /* sobol: each block in the order of its cells */
     double (*points)[2];              /* blue: progressive, in the unit disc */
     float mask[MASK_EDGE][MASK_EDGE]; /* blue: ranks in [0, 1) */
 };
@@ -37,7 +37,7 @@ static double unit(uint32_t x) {
     return (double)x * 0x1p-32;
 }
 
-/* --- Sobol points, Owen-scrambled (Burley, 2020; the hash is Laine and Karras', 2011, as he mends it) */
+/* --- Sobol points, Owen-scrambled (Burley, 2020; with his fix of the hash of Laine and Karras, 2011) */
 
 static uint32_t reverse(uint32_t x) {
     x = (x << 16) | (x >> 16);
@@ -58,8 +58,8 @@ static uint32_t scramble(uint32_t x, uint32_t seed) {
     return reverse(x);
 }
 
-/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2, whose entries are products over the
- * bits of row and column (Lucas), so that a step a bit of the bits' number does. */
+/* The second dimension of Sobol's sequence: Pascal's triangle modulo 2. Its entries are products over the
+ * bits of row and column (Lucas), so one step for each bit of the bits' number is enough. */
 static uint32_t sobol_second(uint32_t index) {
     index ^= index >> 1 & 0x55555555u;
     index ^= index >> 2 & 0x33333333u;
@@ -69,8 +69,8 @@ static uint32_t sobol_second(uint32_t index) {
     return reverse(index);
 }
 
-/* One Owen-scrambled net for all; each texel shifts its digits, which keeps every prefix of 2^k a net (Kollig
- * and Keller, "Efficient multidimensional sampling", 2002) and costs two operations a point. */
+/* One Owen-scrambled net serves all texels. Each shifts its digits, which keeps every prefix of 2^k a net
+ * (Kollig and Keller, "Efficient multidimensional sampling", 2002) and costs two operations a point. */
 static void place_net(vshi_sampler *sampler) {
     for (uint32_t i = 0; i < (uint32_t)sampler->count; ++i) {
         const uint32_t shuffled = scramble(i, 0x9e3779b9u);
@@ -79,7 +79,7 @@ static void place_net(vshi_sampler *sampler) {
     }
 }
 
-/* Sine and cosine up to π/4 by their series, to 1e-11: own arithmetic, so that no libm shows in the bits. */
+/* Sine and cosine up to π/4 by their series, to 1e-11. Bits must not depend on libm. */
 static inline void small_angle(double angle, double *sine, double *cosine) {
     static const double S[] = {-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362880.0, -1.0 / 39916800.0};
     static const double C[] = {-1.0 / 2.0,    1.0 / 24.0,       -1.0 / 720.0,
@@ -89,8 +89,8 @@ static inline void small_angle(double angle, double *sine, double *cosine) {
     *cosine = 1.0 + x * (C[0] + x * (C[1] + x * (C[2] + x * (C[3] + x * (C[4] + x * C[5])))));
 }
 
-/* The unit square to the unit disc, areas kept and neighbours near (Shirley and Chiu, "A low distortion map
- * between disk and square", 1997). */
+/* Maps the unit square to the unit disc; keeps areas, and neighbours near (Shirley and Chiu, "A low
+ * distortion map between disk and square", 1997). */
 static void to_disc(const double square[2], double disc[2]) {
     const double x = 2.0 * square[0] - 1.0, y = 2.0 * square[1] - 1.0;
     if (x == 0.0 && y == 0.0) {
@@ -115,7 +115,7 @@ static void sort_cells(vshi_sampler *sampler) {
         const uint32_t begin = i < VSHI_SAMPLER_BLOCK ? 0 : size, end = begin + size;
         const uint32_t at = begin + vshi_sampler_cell(size, sampler->net[i][0], sampler->net[i][1]);
         memcpy(sampler->cells[end <= count ? at : i], sampler->net[i],
-               sizeof *sampler->net); /* cut: no cells */
+               sizeof *sampler->net); /* an incomplete block has no cells */
     }
 }
 
@@ -125,7 +125,7 @@ const uint32_t (*vshi_sampler_cells(const vshi_sampler *sampler, uint32_t first)
 
 /* --- blue noise */
 
-/* The candidate that is farthest from all points before it, so that every prefix is spread evenly (Mitchell,
+/* Places the candidate that is farthest from all earlier points, so that every prefix is even (Mitchell,
  * "Spectrally optimal sampling for distribution ray tracing", 1991). */
 static void place_blue(vshi_sampler *sampler) {
     double(*points)[2] = sampler->points;
@@ -150,7 +150,7 @@ static void place_blue(vshi_sampler *sampler) {
     }
 }
 
-/* What a set bit adds to the energy of its neighbours: a Gaussian of 1.9 texels on the torus. */
+/* Adds a bit's energy to its neighbours: a Gaussian of 1.9 texels on the torus. */
 static void add_energy(double *energy, const double *kernel, int32_t at, double sign) {
     const int32_t row = at / MASK_EDGE, column = at % MASK_EDGE;
     for (int32_t y = 0; y < MASK_EDGE; ++y) {
@@ -161,7 +161,7 @@ static void add_energy(double *energy, const double *kernel, int32_t at, double 
     }
 }
 
-/* The set bit in the tightest cluster, or the clear one in the largest void. */
+/* Finds the set bit in the tightest cluster, or the clear bit in the largest void. */
 static int32_t extreme(const double *energy, const uint8_t *set, bool cluster) {
     int32_t best = -1;
     for (int32_t i = 0; i < MASK_EDGE * MASK_EDGE; ++i) {
@@ -179,7 +179,7 @@ static bool place_mask(vshi_sampler *sampler) {
     struct {
         double kernel[TEXELS], energy[TEXELS];
         uint8_t set[TEXELS];
-        double first_energy[TEXELS]; /* of the first bits, evened out */
+        double first_energy[TEXELS]; /* of the even first bits */
         uint8_t first[TEXELS];
     } *p = calloc(1, sizeof *p);
     if (p == NULL) {
@@ -188,7 +188,7 @@ static bool place_mask(vshi_sampler *sampler) {
     for (int32_t i = 0; i < TEXELS; ++i) {
         const int32_t y = i / MASK_EDGE, x = i % MASK_EDGE;
         const int32_t dy = y < MASK_EDGE / 2 ? y : MASK_EDGE - y, dx = x < MASK_EDGE / 2 ? x : MASK_EDGE - x;
-        /* 2^-(r²/5) is the Gaussian of 1.9 texels, in arithmetic that has the same bits everywhere */
+        /* 2^-(r²/5) is the Gaussian of 1.9 texels; this arithmetic gives the same bits everywhere */
         p->kernel[i] = ldexp(1.0 - 0.129449436703875 * ((dx * dx + dy * dy) % 5), -((dx * dx + dy * dy) / 5));
     }
     for (uint32_t i = 0, placed = 0; placed < FIRST; ++i) {
@@ -199,7 +199,7 @@ static bool place_mask(vshi_sampler *sampler) {
             ++placed;
         }
     }
-    for (;;) { /* even out: from the tightest cluster to the largest void, until it would go back */
+    for (;;) { /* move bits from the tightest cluster to the largest void, until one would go back */
         const int32_t from = extreme(p->energy, p->set, true);
         p->set[from] = 0;
         add_energy(p->energy, p->kernel, from, -1.0);
@@ -229,7 +229,7 @@ static bool place_mask(vshi_sampler *sampler) {
     return true;
 }
 
-/* The point turned about the centre by a part of a whole turn, 0 … 1. */
+/* Turns a point about the centre by a part of a whole turn, 0 … 1. */
 static void turn(double part, double point[2]) {
     const int quarter = (int)(4.0 * part + 0.5);
     double s, c;
@@ -246,8 +246,7 @@ static void turn(double part, double point[2]) {
 
 double vshi_sampler_mask(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose) {
     static const double GOLDEN = 0.61803398874989485;
-    /* each purpose reads the mask from another place, and each frame has its ranks moved on by the golden
-     * ratio */
+    /* each purpose reads the mask at another place; each frame adds the golden ratio to the ranks */
     const uint32_t shift = purpose == 0 ? 0 : hash(purpose);
     const uint32_t column = ((texel & 0xffffu) + shift) % MASK_EDGE,
                    row = ((texel >> 16) + (shift >> 16)) % MASK_EDGE;

@@ -1,12 +1,11 @@
-/* Sphere tracing (J. C. Hart, "Sphere tracing: a geometric method for the antialiased ray tracing of implicit
- * surfaces", 1996) of procedural solids: a tree's distance never passes the true one and changes by at most 1
- * per unit (sdf/sdf.c), so a step of that length meets nothing. */
+/* Sphere tracing of procedural solids (J. C. Hart, "Sphere tracing: a geometric method for the antialiased
+ * ray tracing of implicit surfaces", 1996). A tree's distance is at most the true one and changes by at most
+ * 1 per unit (sdf/sdf.c). So a step of that length meets nothing. */
 #include "trace/solids.h"
 
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/similarity.h"
 #include "base/vec.h"
 #include "sdf/sdf.h"
 
@@ -14,31 +13,31 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Of the diagonal of the box around all solids: a ray that comes this near has met one. Far above the
- * rounding of doubles, far below what a texel shows; a ray that only grazes a solid takes some 10^4 steps. */
+/* A ray this near to a solid has met it. Share of the diagonal of the box around all solids: far above the
+ * rounding of doubles, far below a texel. A ray that grazes a solid needs some 10^4 steps. */
 static const double HIT = 1e-9;
 enum { MOST_STEPS = 100000, CONE_STEPS = 96 };
-/* Of the diagonal: the least step of a cone that looks for a solid to be covered by. */
+/* Least step of a cone inside of solids, share of the diagonal. */
 static const double CONE_STEP = 1e-3;
 
-/* A tree without the unions at its root: a ray meets a union where it meets one of its operands, and each of
- * those has a box of its own that most rays miss. */
+/* An operand of the unions at a tree's root. A ray that meets a union meets one of its operands, whose boxes
+ * most rays miss. */
 typedef struct member {
-    vsh_sdf sdf;        /* its nodes belong to the solids */
-    double inverse[12]; /* world to local */
-    double scale;       /* local to world */
-    vshi_vec low, high; /* box, world; inside out where it is empty */
-    vshi_vec centre;    /* these two of a sphere, world; else the radius is 0 */
+    vsh_sdf sdf;            /* its nodes belong to the solids */
+    double inverse[12];     /* world to local */
+    double scale;           /* local to world */
+    double low[3], high[3]; /* box, world; low > high if it is empty */
+    vshi_vec centre;        /* these two of a sphere, world; else the radius is 0 */
     double radius;
 } member;
 
-struct vsh_solids {
+struct vshi_solids {
     vsh_sdf_node **nodes; /* [tree_count] */
     size_t tree_count;
     member *members;
     size_t count;
-    vshi_vec low, high; /* box around all; inside out where there is none */
-    double size;        /* its diagonal */
+    double low[3], high[3]; /* box around all; low > high if there is none */
+    double size;            /* its diagonal */
 };
 
 static void invert(const double *m, double inverse[12]) {
@@ -68,7 +67,7 @@ static void compose(const double outer[12], const double inner[12], double resul
     }
 }
 
-/* Where a node puts what it combines. */
+/* The transform of a node. */
 static void node_transform(const vsh_sdf_node *node, double m[12]) {
     const double *q = node->rotation;
     const double by = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]), s = node->scale;
@@ -82,13 +81,15 @@ static void node_transform(const vsh_sdf_node *node, double m[12]) {
     memcpy(m, rows, sizeof rows);
 }
 
-static void grow(vshi_vec *low, vshi_vec *high, vshi_vec p) {
-    *low = (vshi_vec){fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z)};
-    *high = (vshi_vec){fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z)};
+static void empty_box(double low[3], double high[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = INFINITY;
+        high[axis] = -INFINITY;
+    }
 }
 
-/* Adds the subtree under node `root` of a tree that lies in the world as `transform` says. */
-static void add_members(vsh_solids *solids, const vsh_sdf_node *nodes, int32_t root,
+/* Adds the subtree under node `root` of a tree; `transform` moves the tree to the world. */
+static void add_members(vshi_solids *solids, const vsh_sdf_node *nodes, int32_t root,
                         const double *transform) {
     const vsh_sdf_node *node = &nodes[root];
     if (node->shape == VSH_SDF_UNION) {
@@ -102,28 +103,24 @@ static void add_members(vsh_solids *solids, const vsh_sdf_node *nodes, int32_t r
     member *m = &solids->members[solids->count++];
     m->sdf = (vsh_sdf){nodes, (size_t)root + 1};
     m->scale = vshi_cbrt(fabs(vshi_transform_determinant(transform)));
-    m->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
-    m->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    empty_box(m->low, m->high);
     invert(transform, m->inverse);
     double min[3], max[3];
-    vsh_sdf_bounds(&m->sdf, min, max);
+    vshi_sdf_bounds(&m->sdf, min, max);
     if (!(min[0] <= max[0] && min[1] <= max[1] && min[2] <= max[2])) {
         return;
     }
-    for (int i = 0; i < 8; ++i) {
-        const vshi_vec corner = {i & 1 ? max[0] : min[0], i & 2 ? max[1] : min[1], i & 4 ? max[2] : min[2]};
-        grow(&m->low, &m->high, vshi_transform_point(transform, corner));
-    }
-    grow(&solids->low, &solids->high, m->low);
-    grow(&solids->low, &solids->high, m->high);
+    vshi_grow_box_by(m->low, m->high, transform, min, max);
+    vshi_grow_box(solids->low, solids->high, vshi_vec_of(m->low));
+    vshi_grow_box(solids->low, solids->high, vshi_vec_of(m->high));
     if (node->shape == VSH_SDF_SPHERE) {
         m->centre = vshi_transform_point(transform, vshi_vec_of(node->translation));
         m->radius = m->scale * node->scale * node->radius;
     }
 }
 
-/* Copies a tree that has been checked; there is room for all of its nodes as members. */
-static vsh_result add_tree(vsh_solids *solids, const vsh_sdf *sdf, const double *transform,
+/* Copies a checked tree. There is room for all of its nodes as members. */
+static vsh_result add_tree(vshi_solids *solids, const vsh_sdf *sdf, const double *transform,
                            vsh_error *error) {
     void *nodes;
     VSHI_TRY(vshi_allocate(&nodes, sdf->node_count, sizeof *sdf->nodes, "sdf nodes", error));
@@ -138,7 +135,7 @@ static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t co
                         vsh_error *error) {
     *nodes = 0;
     for (size_t i = 0; i < count; ++i) {
-        VSHI_TRY(vsh_sdf_check(&sdfs[i], error));
+        VSHI_TRY(vshi_sdf_check(&sdfs[i], error));
         if (transforms != NULL && !(vshi_similarity_scale(transforms + 12 * i) > 0.0)) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "solid %zu: the transform of an sdf must neither shear nor scale unevenly", i);
@@ -148,35 +145,36 @@ static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t co
     return VSH_OK;
 }
 
-vsh_result vsh_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count, vsh_solids **solids,
-                             vsh_error *error) {
+vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count,
+                              vshi_solids **solids, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(solids);
     *solids = NULL;
     VSHI_NEEDS_OF(count, sdfs);
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     size_t nodes;
-    vsh_solids *made;
+    vshi_solids *made;
     vsh_result result;
     VSHI_TRY(check(sdfs, transforms, count, &nodes, error));
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "solids", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made->nodes, count, sizeof *made->nodes, "solids", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made->members, nodes, sizeof *made->members, "solids", error));
-    made->low = (vshi_vec){INFINITY, INFINITY, INFINITY};
-    made->high = (vshi_vec){-INFINITY, -INFINITY, -INFINITY};
+    empty_box(made->low, made->high);
     for (size_t i = 0; i < count; ++i) {
         const double *transform = transforms != NULL ? transforms + 12 * i : identity;
         VSHI_TRY_DONE(add_tree(made, &sdfs[i], transform, error));
     }
-    made->size = made->low.x <= made->high.x ? vshi_length(vshi_sub(made->high, made->low)) : 0.0;
+    made->size = made->low[0] <= made->high[0]
+                     ? vshi_length(vshi_sub(vshi_vec_of(made->high), vshi_vec_of(made->low)))
+                     : 0.0;
     *solids = made;
     made = NULL;
 done:
-    vsh_solids_free(made);
+    vshi_solids_free(made);
     return result;
 }
 
-void vsh_solids_free(vsh_solids *solids) {
+void vshi_solids_free(vshi_solids *solids) {
     if (solids == NULL) {
         return;
     }
@@ -192,7 +190,7 @@ static double member_distance(const member *m, vshi_vec p) {
     return m->scale * vshi_sdf_distance_at(&m->sdf, vshi_transform_point(m->inverse, p));
 }
 
-static double distance_at(const vsh_solids *solids, vshi_vec p) {
+static double distance_at(const vshi_solids *solids, vshi_vec p) {
     double nearest = INFINITY;
     for (size_t i = 0; i < solids->count; ++i) {
         const double distance = member_distance(&solids->members[i], p);
@@ -201,31 +199,18 @@ static double distance_at(const vsh_solids *solids, vshi_vec p) {
     return nearest;
 }
 
-double vsh_solids_distance(const vsh_solids *solids, const double position[3]) {
+double vshi_solids_distance(const vshi_solids *solids, const double position[3]) {
     VSHI_FLOATS;
     const vshi_vec p = vshi_vec_of(position);
     return vshi_finite(p) ? distance_at(solids, p) : NAN;
 }
 
-/* The part of a ray within a member's box; false where there is none. */
+/* The part of a ray within a member's box; false if there is none. */
 static bool clip(const member *m, const vshi_segment_ray *ray, double *begin, double *end) {
-    const double low[3] = {m->low.x, m->low.y, m->low.z};
-    const double high[3] = {m->high.x, m->high.y, m->high.z};
     *begin = 0.0;
     *end = ray->far;
     for (int axis = 0; axis < 3; ++axis) {
-        const double o = ray->origin[axis], d = ray->direction[axis];
-        if (d == 0.0) {
-            if (!(o >= low[axis] && o <= high[axis])) {
-                return false;
-            }
-            continue;
-        }
-        /* comparisons, as fmin and fmax are calls where NaN must be minded, and none is here */
-        const double a = (low[axis] - o) / d, b = (high[axis] - o) / d;
-        const double first = a < b ? a : b, last = a < b ? b : a;
-        *begin = first > *begin ? first : *begin;
-        *end = last < *end ? last : *end;
+        vshi_clip_axis(ray->origin[axis], ray->direction[axis], m->low[axis], m->high[axis], begin, end);
     }
     return *begin <= *end;
 }
@@ -242,7 +227,7 @@ static double meet_sphere(const member *m, const vshi_segment_ray *ray, double h
     return t >= 0.0 && t <= ray->far ? t : INFINITY;
 }
 
-/* How far the ray goes until it meets the member; infinite where it does not. */
+/* The distance at which the ray meets the member; infinite if it does not. */
 static double meet(const member *m, const vshi_segment_ray *ray, double hit) {
     double t, end;
     if (m->radius > 0.0) {
@@ -262,24 +247,23 @@ static double meet(const member *m, const vshi_segment_ray *ray, double hit) {
         }
         t += distance;
     }
-    return t; /* after the last step it has not got away from the surface */
+    return t; /* after the last step it is still near the surface */
 }
 
-size_t vshi_solids_part_count(const vsh_solids *solids) {
+size_t vshi_solids_part_count(const vshi_solids *solids) {
     return solids->count;
 }
 
-void vshi_solids_part_box(const vsh_solids *solids, size_t part, double low[3], double high[3]) {
-    const member *m = &solids->members[part];
-    memcpy(low, (double[]){m->low.x, m->low.y, m->low.z}, 3 * sizeof *low);
-    memcpy(high, (double[]){m->high.x, m->high.y, m->high.z}, 3 * sizeof *high);
+void vshi_solids_part_box(const vshi_solids *solids, size_t part, double low[3], double high[3]) {
+    memcpy(low, solids->members[part].low, sizeof solids->members[part].low);
+    memcpy(high, solids->members[part].high, sizeof solids->members[part].high);
 }
 
-double vshi_solids_part_meet(const vsh_solids *solids, size_t part, const vshi_segment_ray *ray) {
+double vshi_solids_part_meet(const vshi_solids *solids, size_t part, const vshi_segment_ray *ray) {
     return meet(&solids->members[part], ray, HIT * solids->size);
 }
 
-void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays, size_t count,
+void vshi_solids_blocked(const vshi_solids *solids, const vshi_segment_ray *rays, size_t count,
                          bool *blocked) {
     for (size_t i = 0; i < count; ++i) {
         for (size_t k = 0; k < solids->count && !blocked[i]; ++k) {
@@ -288,21 +272,21 @@ void vshi_solids_blocked(const vsh_solids *solids, const vshi_segment_ray *rays,
     }
 }
 
-/* Where along the axis the box around all solids ends. */
-static double last_of(const vsh_solids *solids, vshi_vec origin, vshi_vec axis) {
-    const vshi_vec to = {axis.x > 0.0 ? solids->high.x : solids->low.x,
-                         axis.y > 0.0 ? solids->high.y : solids->low.y,
-                         axis.z > 0.0 ? solids->high.z : solids->low.z};
+/* The depth along the axis at which the box around all solids ends. */
+static double find_last(const vshi_solids *solids, vshi_vec origin, vshi_vec axis) {
+    const double *low = solids->low, *high = solids->high;
+    const vshi_vec to = {axis.x > 0.0 ? high[0] : low[0], axis.y > 0.0 ? high[1] : low[1],
+                         axis.z > 0.0 ? high[2] : low[2]};
     return vshi_dot(vshi_sub(to, origin), axis);
 }
 
-/* The ball of radius |distance| around a point of the axis holds the cone's disc there, or does not reach it:
- * all of the disc is then inside one solid, or free; and distances change by at most 1 per unit, which says
- * for how much of the axis that goes on. */
-vshi_cone_state vshi_solids_cone(const vsh_solids *solids, const double origin[3], const double axis[3],
+/* If the ball of radius |distance| around a point of the axis holds the cone's disc there, all of the disc is
+ * inside one solid, or free. Distances change by at most 1 per unit, which gives the length of the axis for
+ * which that remains true. */
+vshi_cone_state vshi_solids_cone(const vshi_solids *solids, const double origin[3], const double axis[3],
                                  double tangent, double near, double far) {
     const vshi_vec from = vshi_vec_of(origin), along = vshi_vec_of(axis);
-    const double hit = HIT * solids->size, last = last_of(solids, from, along);
+    const double hit = HIT * solids->size, last = find_last(solids, from, along);
     bool free_so_far = true;
     double t = 0.0;
     for (int step = 0; step < CONE_STEPS; ++step) {

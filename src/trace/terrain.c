@@ -1,14 +1,14 @@
 #include "trace/terrain.h"
 
-#include "base/isa.h"
+#include "base/job.h"
 #include "base/memory.h"
-#include "base/similarity.h"
+#include "base/vec.h"
 
 #include <stdlib.h>
 
-/* Cells along the ground in a unit of a ray's length, at least: of an upright one. */
+/* Least number of cells along the ground in a unit of a ray's length: for upright rays. */
 static const double LEAST_SPEED = 1e-9;
-/* Room over and under all heights, of their range and of the longer side: rounding puts no ray beyond it. */
+/* Room for rounding over and under all heights: shares of their range and of the longer side. */
 static const double ROOM = 1e-2, FLAT = 1e-4;
 
 /* Blocks along a side of `cells` cells. */
@@ -16,7 +16,8 @@ static int32_t blocks(int32_t cells, int32_t level) {
     return (int32_t)(((int64_t)cells + (1 << level) - 1) >> level);
 }
 
-/* The greatest heights of blocks of two by two blocks below, or of cells, whose corners they share. */
+/* Finds the greatest heights of blocks of two by two blocks of the level below, or of cells. Cells share
+ * corners. */
 static void fill_level(const vshi_relief *r, int32_t level) {
     const float *below = r->height[level - 1];
     const int32_t shared = level == 1; /* with the next block */
@@ -36,7 +37,7 @@ static void fill_level(const vshi_relief *r, int32_t level) {
     }
 }
 
-/* Finds the transform from the rays' space to cells. It inverts the transform from cells to the world. */
+/* Finds the transform from the rays' space to cells, the inverse of that from cells to the world. */
 static void place(const vsh_mesh *mesh, vshi_terrain t, const double centre[3], double scale,
                   vshi_relief *r) {
     const float *first = mesh->positions, *last = mesh->positions + 3 * (t.columns * t.rows - 1);
@@ -94,26 +95,6 @@ void vshi_relief_free(vshi_relief *relief) {
     *relief = (vshi_relief){0};
 }
 
-/* fmin() and fmax() are calls, as they know NaN. */
-static inline double lesser(double a, double b) {
-    return a < b ? a : b;
-}
-
-static inline double greater(double a, double b) {
-    return a > b ? a : b;
-}
-
-/* Where a ray is over the ground, of t, along one axis of `cells` cells. */
-static void clip(double origin, double along, double cells, double *from, double *to) {
-    if (along == 0.0) {
-        *to = origin >= 0.0 && origin <= cells ? *to : -1.0;
-        return;
-    }
-    const double a = -origin / along, b = (cells - origin) / along;
-    *from = greater(*from, lesser(a, b));
-    *to = lesser(*to, greater(a, b));
-}
-
 void vshi_terrain_aim(const vshi_relief *r, const float origin[3], const float direction[3], double from,
                       double to, int lane, vshi_terrain_rays *rays) {
     double at[3], along[3];
@@ -122,14 +103,15 @@ void vshi_terrain_aim(const vshi_relief *r, const float origin[3], const float d
         along[k] = m[0] * (double)direction[0] + m[1] * (double)direction[1] + m[2] * (double)direction[2];
         at[k] = m[0] * (double)origin[0] + m[1] * (double)origin[1] + m[2] * (double)origin[2] + m[3];
     }
-    const double speed = greater(greater(fabs(along[0]), fabs(along[2])), LEAST_SPEED);
-    double first = from * speed, last = lesser(to * speed, 1e30);
+    const double speed = fmax(fmax(fabs(along[0]), fabs(along[2])), LEAST_SPEED);
+    double first = from * speed, last = fmin(to * speed, 1e30);
     const double dx = along[0] / speed, dz = along[2] / speed;
-    clip(at[0], dx, r->columns - 1, &first, &last);
-    clip(at[2], dz, r->rows - 1, &first, &last);
+    vshi_clip_axis(at[0], dx, 0.0, r->columns - 1, &first, &last);
+    vshi_clip_axis(at[2], dz, 0.0, r->rows - 1, &first, &last);
     const double range = (double)r->highest - (double)r->lowest, room = ROOM * range + FLAT * r->side;
-    clip(at[1] - (double)r->lowest + room, along[1] / speed, range + 2.0 * room, &first, &last);
-    /* counted from where the ray comes over the grid, which may be far from its origin */
+    vshi_clip_axis(at[1] - (double)r->lowest + room, along[1] / speed, 0.0, range + 2.0 * room, &first,
+                   &last);
+    /* from the place where the ray reaches the grid, which may be far from its origin */
     const double x = at[0] + first * dx, z = at[2] + first * dz;
     const bool over = first <= last;
     const double column = over ? floor(x) : 0.0, row = over ? floor(z) : 0.0;

@@ -1,12 +1,11 @@
-/* Lights and open sky seen from points, by rays against the casters themselves: no field, no estimate but the
- * number of rays. */
+/* Visibility of lights and of the sky from points, by rays against the casters, without a field. */
 #include "trace/trace.h"
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "base/vec.h"
-#include "light/view.h"
+#include "light/light.h"
 #include "trace/embree.h"
 #include "trace/solids.h"
 
@@ -15,7 +14,7 @@
 
 enum { MAX_RAYS = 65536, AT_ONCE = 256, GRAIN = 64 };
 
-/* Points of a call that all shoot the same rays. */
+/* A call whose points all shoot the same rays. */
 typedef struct tracing {
     vshi_truth truth;
     const double *positions;
@@ -24,10 +23,10 @@ typedef struct tracing {
     float *values;
 } tracing;
 
-/* A light as a disc a unit away: its radius, and the most that a ray goes along it. */
+/* A light as a disc a unit away, or a dome. */
 typedef struct target {
     vshi_vec axis, u, v;
-    double radius;
+    double radius;   /* of the disc */
     vshi_lean lean;  /* of AO */
     vshi_vec mirror; /* of AO over a horizon: vshi_dome_mirror() */
     double distance; /* of the light's centre; infinite for a directional light */
@@ -35,9 +34,9 @@ typedef struct target {
     vshi_light_view view;
 } target;
 
-/* Vogel's spiral ("A better way to construct the sunflower head", 1979), radii √((i + ½) / n), so that every
- * ring has its share. */
-static void place(tracing *task) {
+/* Places points along Vogel's spiral ("A better way to construct the sunflower head", 1979). Radii √((i + ½)
+ * / n) spread them evenly over the disc. */
+static void place_disc(tracing *task) {
     static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
     const int32_t rays = task->truth.rays;
     for (int32_t i = 0; i < rays; ++i) {
@@ -47,7 +46,7 @@ static void place(tracing *task) {
     }
 }
 
-/* Where the light stands, seen from a point. */
+/* Aims at the light from a point. */
 static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target *t) {
     vshi_light_view view;
     const vshi_light_side side = vshi_light_look(place, from, false, &view);
@@ -63,8 +62,8 @@ static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target 
     return side;
 }
 
-/* How far a ray at `cosine` to the axis goes: up to the sphere's near side. */
-static double far_of(const target *t, double cosine) {
+/* The length of a ray at `cosine` to the axis: up to the sphere's near side. */
+static double find_length(const target *t, double cosine) {
     if (!isfinite(t->distance)) {
         return INFINITY;
     }
@@ -72,57 +71,48 @@ static double far_of(const target *t, double cosine) {
     return t->distance * cosine - (across > 0.0 ? sqrt(across) : 0.0);
 }
 
-/* The same to a light that is no disc. */
-static bool direct_to_shape(const vshi_light_place *place, const target *t, const double disc[2],
-                            const vshi_vec *normal, vshi_segment_ray *ray) {
-    const vshi_vec way = place->shape->ray(place, &t->view, disc), d = vshi_unit(way);
-    ray->direction[0] = d.x;
-    ray->direction[1] = d.y;
-    ray->direction[2] = d.z;
-    ray->far = vshi_length(way);
-    return normal == NULL || vshi_dot(d, *normal) > 0.0;
-}
-
-/* The direction of a place on the unit disc, and how far it goes; false below the horizon of `normal` (NULL:
- * none). */
-static bool direct(const vshi_truth *truth, const target *t, const double disc[2], const vshi_vec *normal,
-                   vshi_segment_ray *ray) {
-    if (truth->place.shape != NULL) {
-        return direct_to_shape(&truth->place, t, disc, normal, ray);
-    }
-    double place[2] = {disc[0] * t->radius, disc[1] * t->radius}, up, scale = 1.0;
-    if (truth->light != NULL) {
-        scale = 1.0 / sqrt(1.0 + place[0] * place[0] + place[1] * place[1]);
-        up = scale;
-        ray->far = far_of(t, up);
+/* Aims a ray at a place on the unit disc; false below the horizon of `normal` (NULL: none). */
+static bool aim_ray(const vshi_truth *truth, const target *t, const double disc[2], const vshi_vec *normal,
+                    vshi_segment_ray *ray) {
+    vshi_vec d;
+    if (truth->place.is_rectangle) { /* a light that is no disc */
+        const vshi_vec way = vshi_rectangle_ray(&truth->place, &t->view, disc);
+        d = vshi_unit(way);
+        ray->far = vshi_length(way);
     } else {
-        vshi_dome_place(&t->lean, place);
-        const double square = 1.0 - place[0] * place[0] - place[1] * place[1];
-        up = square > 0.0 ? sqrt(square) : 0.0;
-        ray->far = truth->distance;
+        double place[2] = {disc[0] * t->radius, disc[1] * t->radius}, up, scale = 1.0;
+        if (truth->light != NULL) {
+            scale = 1.0 / sqrt(1.0 + place[0] * place[0] + place[1] * place[1]);
+            up = scale;
+            ray->far = find_length(t, up);
+        } else {
+            vshi_dome_place(&t->lean, place);
+            const double square = 1.0 - place[0] * place[0] - place[1] * place[1];
+            up = square > 0.0 ? sqrt(square) : 0.0;
+            ray->far = truth->distance;
+        }
+        const vshi_vec across =
+            vshi_add(vshi_scale(t->u, scale * place[0]), vshi_scale(t->v, scale * place[1]));
+        d = vshi_dome_mirror(vshi_add(across, vshi_scale(t->axis, up)), t->mirror);
     }
-    const vshi_vec towards =
-        vshi_add(vshi_add(vshi_scale(t->u, scale * place[0]), vshi_scale(t->v, scale * place[1])),
-                 vshi_scale(t->axis, up));
-    const vshi_vec d = vshi_dome_mirror(towards, t->mirror);
     ray->direction[0] = d.x;
     ray->direction[1] = d.y;
     ray->direction[2] = d.z;
     return normal == NULL || vshi_dot(d, *normal) > 0.0;
 }
 
-/* What the solids leave of all rays to a target, as far as can be proved at once. */
-static vshi_cone_state look(const vshi_truth *truth, vshi_vec origin, const target *t) {
+/* Proves whether the solids hide all rays to a target, or none. */
+static vshi_cone_state prove(const vshi_truth *truth, vshi_vec origin, const target *t) {
     const double from[3] = {origin.x, origin.y, origin.z};
     if (truth->solids == NULL) {
         return VSHI_CONE_FREE;
     }
     if (truth->light == NULL) {
-        return vsh_solids_distance(truth->solids, from) > truth->distance ? VSHI_CONE_FREE
-                                                                          : VSHI_CONE_UNKNOWN;
+        return vshi_solids_distance(truth->solids, from) > truth->distance ? VSHI_CONE_FREE
+                                                                           : VSHI_CONE_UNKNOWN;
     }
     const double axis[3] = {t->axis.x, t->axis.y, t->axis.z}, bound = t->view.bound;
-    if (truth->place.shape == NULL) {
+    if (!truth->place.is_rectangle) {
         return vshi_solids_cone(truth->solids, from, axis, t->radius, t->distance - t->size, t->distance);
     }
     return isfinite(bound) ? vshi_solids_cone(truth->solids, from, axis, bound / sqrt(1.0 - bound * bound),
@@ -130,26 +120,16 @@ static vshi_cone_state look(const vshi_truth *truth, vshi_vec origin, const targ
                            : VSHI_CONE_UNKNOWN;
 }
 
-static void meet(const vshi_truth *truth, const vsh_solids *solids, const vshi_segment_ray *rays,
-                 size_t count, bool *blocked) {
-    memset(blocked, 0, count * sizeof *blocked);
-    if (truth->triangles != NULL) {
-        vshi_triangles_blocked(truth->triangles, rays, count, blocked);
-    }
-    if (solids != NULL) {
-        vshi_solids_blocked(solids, rays, count, blocked);
-    }
-}
-
-/* A point that rays begin at, and what they go to. */
+/* The origin and the target of a point's rays. */
 typedef struct viewpoint {
     vshi_vec origin, normal; /* no normal: zero */
     target target;
-    const vshi_vec *over;     /* rays that are not over this plane count as hidden; NULL: none */
-    const vsh_solids *solids; /* that rays may meet */
+    const vshi_vec *over;      /* rays below this plane count as hidden; NULL: none */
+    const vshi_solids *solids; /* that rays may meet */
 } viewpoint;
 
-/* Limits AO to the directions above the point's face; over a horizon those below it are mirrored at it. */
+/* Limits AO to the directions above the point's face. Over a horizon it mirrors directions below the face
+ * instead. */
 static void aim_dome(const vshi_truth *truth, vshi_vec face, target *t) {
     vshi_frame(t->axis, &t->u, &t->v);
     if (!(vshi_dot(face, t->axis) < VSHI_ONE_NORMAL)) {
@@ -162,7 +142,7 @@ static void aim_dome(const vshi_truth *truth, vshi_vec face, target *t) {
     }
 }
 
-/* False where the point's value needs no rays: it is then in *value. `face`: of AO; NULL: the normal. */
+/* Returns false if the point's value needs no rays, and is in *value. `face` is of AO; NULL: the normal. */
 static bool place_point(const vshi_truth *truth, const double position[3], const float *normal,
                         const float *face, viewpoint *from, double *value) {
     *from = (viewpoint){.origin = vshi_vec_of(position)};
@@ -189,7 +169,7 @@ static bool place_point(const vshi_truth *truth, const double position[3], const
             return false;
         }
     }
-    const vshi_cone_state state = look(truth, from->origin, &from->target);
+    const vshi_cone_state state = prove(truth, from->origin, &from->target);
     if (state == VSHI_CONE_COVERED) {
         *value = 0.0;
         return false;
@@ -199,7 +179,7 @@ static bool place_point(const vshi_truth *truth, const double position[3], const
     return true;
 }
 
-/* How many of the rays to places [count] on the disc meet nothing. */
+/* Counts the rays to places [count] on the disc that meet nothing. */
 static int32_t count_free(const vshi_truth *truth, const viewpoint *from, const double (*disc)[2],
                           int32_t count) {
     const vshi_vec o = from->origin;
@@ -210,9 +190,15 @@ static int32_t count_free(const vshi_truth *truth, const viewpoint *from, const 
     for (int32_t i = 0; i < count; ++i) {
         vshi_segment_ray *ray = &rays[waiting];
         *ray = (vshi_segment_ray){{o.x, o.y, o.z}, {0.0, 0.0, 0.0}, 0.0};
-        waiting += direct(truth, &from->target, disc[i], from->over, ray);
+        waiting += aim_ray(truth, &from->target, disc[i], from->over, ray);
         if (waiting == AT_ONCE || (i + 1 == count && waiting > 0)) {
-            meet(truth, from->solids, rays, waiting, blocked);
+            memset(blocked, 0, waiting * sizeof *blocked);
+            if (truth->triangles != NULL) {
+                vshi_triangles_blocked(truth->triangles, rays, waiting, blocked);
+            }
+            if (from->solids != NULL) {
+                vshi_solids_blocked(from->solids, rays, waiting, blocked);
+            }
             for (size_t r = 0; r < waiting; ++r) {
                 free += !blocked[r];
             }
@@ -234,19 +220,18 @@ static float trace_point(const tracing *task, size_t point) {
     return (float)((double)free / (double)rays);
 }
 
-/* Rays that all agree are no reason to end where they don't agree with the value: few rays miss what is
- * small, always to one side. */
-static bool agrees(double free, double taken, double expected) {
+/* Whether rays agree with an expected value. Few rays that agree with each other only are not enough: they
+ * miss small casters, always to one side. */
+static bool agrees(double free, double count, double expected) {
     static const double ENOUGH = 1e-3;
-    return fabs(free - expected * taken) < ENOUGH * taken;
+    return fabs(free - expected * count) < ENOUGH * count;
 }
 
-/* Rays of two sets, all or until they agree with what is expected; how many are free. Returns how many each
- * took, 0 where there is no point; *even: VSHI_TRUTH_… of the first. */
+/* Shoots two sets of rays until they agree with the expected value, and counts the free ones. Returns each
+ * set's number of rays, or 0 if the point needs none. *even: VSHI_TRUTH_… of the first rays. */
 static int32_t count_twice(const vshi_truth *truth, const double position[3], const float normal[3],
                            const float *face, uint32_t texel, double expected, int32_t free[2], int32_t *even,
                            double *value) {
-    /* the samplers' sequences: no others' */
     static const uint32_t PURPOSE[2] = {0x7e570001u, 0x7e570002u};
     viewpoint from;
     free[0] = free[1] = 0;
@@ -292,7 +277,7 @@ bool vshi_truth_count(const vshi_truth *truth, const double position[3], const f
                       const float *face, uint32_t texel, int32_t free[2], int32_t *even) {
     double value;
     if (count_twice(truth, position, normal, face, texel, NAN, free, even, &value) == 0) {
-        free[0] = free[1] = value > 0.5 ? truth->rays : 0; /* known without rays */
+        free[0] = free[1] = value > 0.5 ? truth->rays : 0;
         return !isnan(value);
     }
     return true;
@@ -319,7 +304,7 @@ static vsh_result trace(tracing *task, size_t count, const vsh_run *run, vsh_err
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(
         vshi_allocate((void **)&task->disc, (size_t)task->truth.rays, sizeof *task->disc, "trace", error));
-    place(task);
+    place_disc(task);
     vshi_job *job = vshi_job_begin(&full, "trace", count);
     const vsh_result result = job == NULL
                                   ? vshi_fail(error, VSH_ERROR_MEMORY, "trace: the system refused memory")
@@ -348,37 +333,37 @@ static vsh_result check(const tracing *task, size_t count, const char *call, vsh
     return VSH_OK;
 }
 
-vsh_result vsh_trace_shadow(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
-                            const double *positions, const float *normals, double lift,
-                            const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
-                            vsh_error *error) {
+vsh_result vshi_trace_shadow(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
+                             const double *positions, const float *normals, double lift,
+                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
+                             vsh_error *error) {
     VSHI_FLOATS;
     tracing task = {
         .truth = {.triangles = triangles, .solids = solids, .lift = lift, .light = light, .rays = rays},
         .positions = positions,
         .normals = normals,
         .values = visibility};
-    VSHI_TRY(check(&task, count, "vsh_trace_shadow", error));
+    VSHI_TRY(check(&task, count, "vshi_trace_shadow", error));
     VSHI_TRY(vsh_light_check(light, error));
     task.truth.place = vshi_light_in_world(light);
-    /* all rays to a point are one ray */
+    /* all rays to a point are the same */
     task.truth.rays = vshi_light_is_point(&task.truth.place) ? 1 : rays;
     return trace(&task, count, run, error);
 }
 
-vsh_result vsh_trace_ao(const vsh_triangles *triangles, const vsh_solids *solids, size_t count,
-                        const double *positions, const float *normals, double lift, double distance,
-                        int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
+vsh_result vshi_trace_ao(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
+                         const double *positions, const float *normals, double lift, double distance,
+                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
     VSHI_FLOATS;
     tracing task = {
         .truth = {.triangles = triangles, .solids = solids, .lift = lift, .distance = distance, .rays = rays},
         .positions = positions,
         .normals = normals,
         .values = ao};
-    VSHI_TRY(check(&task, count, "vsh_trace_ao", error));
+    VSHI_TRY(check(&task, count, "vshi_trace_ao", error));
     VSHI_NEEDS_OF(count, normals);
     if (!(distance > 0.0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_trace_ao: distance %g: expected more than 0",
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_trace_ao: distance %g: expected more than 0",
                          distance);
     }
     return trace(&task, count, run, error);

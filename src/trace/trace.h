@@ -2,41 +2,91 @@
 #ifndef VSHI_TRACE_H
 #define VSHI_TRACE_H
 
-#include "light/view.h"
+#include "light/light.h"
 #include "trace/sampler.h"
 
 #include <stdbool.h>
-#include <vdbshade/trace.h>
 
-/* Rays that every point takes, each time; where they all say what is expected it takes no more. */
+/* Procedural casters as they are: no voxels, no triangles. Immutable; may be shared by threads. */
+typedef struct vshi_solids vshi_solids;
+
+/* Copies `count` trees, each under its transform (transforms: [count][12], local to world, three rows of
+ * four; NULL: none is moved). Errors: VSH_ERROR_ARGUMENT (solids NULL, sdfs NULL with a count above 0),
+ * VSH_ERROR_INPUT (as vshi_sdf_check(); a transform that shears or scales unevenly), VSH_ERROR_MEMORY. Free
+ * the result with vshi_solids_free(). */
+vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count,
+                              vshi_solids **solids, vsh_error *error);
+void vshi_solids_free(vshi_solids *solids); /* NULL does nothing */
+
+/* Signed distance to the nearest solid, as vshi_sdf_distance(), world units; infinite where there is none. */
+double vshi_solids_distance(const vshi_solids *solids, const double position[3]);
+
+/* The triangles of some meshes in world space, in a tree for rays. Immutable; may be shared by threads. */
+typedef struct vshi_triangles vshi_triangles;
+
+/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. The first call loads
+ * Embree, which stays loaded. Errors: VSH_ERROR_UNSUPPORTED (Embree cannot be loaded), VSH_ERROR_INPUT (as
+ * vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
+ * vshi_triangles_free(). */
+vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_run *run,
+                                 vshi_triangles **triangles, vsh_error *error);
+
+/* The same, with procedural solids beside the meshes, which rays meet as they are. `solids` may be NULL; they
+ * must outlive the result. */
+vsh_result vshi_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_count, const vshi_solids *solids,
+                                        const vsh_run *run, vshi_triangles **triangles, vsh_error *error);
+void vshi_triangles_free(vshi_triangles *triangles); /* NULL does nothing */
+
+/* Bytes in memory. Cannot fail. */
+uint64_t vshi_triangles_bytes(const vshi_triangles *triangles);
+
+/* Fraction of a light that each of `count` points [count][3] sees, into visibility[count]: `rays` rays (1 …
+ * 65536) over the light's disc (Vogel's spiral, 1979), that begin `lift` world units above the point along
+ * its normal [count][3] (unit; NULL: no horizon) and count as hidden below the normal's plane. Either of
+ * `triangles` and `solids` may be NULL, for none; a ray is hidden that meets one of them. Rays pass no nearer
+ * to a solid than a billionth of the box around all of them, so points on a solid's surface need a lift above
+ * that. (J. C. Hart, "Sphere tracing", 1996; a cone that is proved free of solids, or covered by one, stands
+ * for its rays.) Thread safe. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_CANCELLED, VSH_ERROR_MEMORY. */
+vsh_result vshi_trace_shadow(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
+                             const double *positions, const float *normals, double lift,
+                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
+                             vsh_error *error);
+
+/* Cosine-weighted fraction of the hemisphere that is free within `distance`, likewise; normals must be given.
+ */
+vsh_result vshi_trace_ao(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
+                         const double *positions, const float *normals, double lift, double distance,
+                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error);
+
+/* First rays of each set of a point. If they agree with the expected value, the point shoots no more. */
 enum { VSHI_TRUTH_FIRST = 16 };
 
 typedef struct vshi_truth {
-    const vsh_triangles *triangles; /* one of these may be NULL */
-    const vsh_solids *solids;
+    const vshi_triangles *triangles; /* one of these may be NULL */
+    const vshi_solids *solids;
     const vsh_light *light; /* NULL: AO */
     vshi_light_place place; /* of the light, in world space */
     double distance;        /* of AO */
     const vshi_vec *up;     /* of AO: over this horizon alone; NULL: none */
-    double lift;            /* of rays' beginnings along the normal, world units */
+    double lift;            /* of rays' origins along the normal, world units */
     const vshi_sampler *sampler;
-    int32_t rays; /* that a point takes at most, each time, and the sampler's */
+    int32_t rays; /* most rays of each set of a point; the sampler has as many */
 } vshi_truth;
 
-/* Whether all of both sets' first rays were alike. */
+/* Whether the first rays of both sets were all hidden, or all free. */
 enum { VSHI_TRUTH_EVEN_HIDDEN = -1, VSHI_TRUTH_UNEVEN = 0, VSHI_TRUTH_EVEN_FREE = 1 };
 
-/* vshi_truth_twice() of a value that is not known yet: how many of all rays are free, and VSHI_TRUTH_… of
- * the first ones. */
+/* vshi_truth_twice() before the expected value is known: counts the free rays of both full sets. *even:
+ * VSHI_TRUTH_… of the first rays. */
 bool vshi_truth_count(const vshi_truth *truth, const double position[3], const float normal[3],
                       const float *face, uint32_t texel, int32_t free[2], int32_t *even);
 
-/* What vshi_truth_twice() would have told of it. */
+/* The result of vshi_truth_twice(), from the counts of vshi_truth_count(). */
 void vshi_truth_settle(int32_t rays, const int32_t free[2], int32_t even, double expected, double seen[2]);
 
-/* The value at a point, by two sets of rays that are independent of each other and of those that shading
- * casts: (f - seen[0]) (f - seen[1]) is the squared error of f on average, without the rays' own. False where
- * there is no value: no normal, a position that is not finite. Thread safe. */
+/* The value at a point, by two sets of rays, independent of each other and of shading's rays. On average (f -
+ * seen[0]) (f - seen[1]) is the squared error of f, without the error of these rays. Returns false if there
+ * is no value: no normal, or a position that is not finite. Thread safe. */
 bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
                       const float *face, uint32_t texel, double expected, double seen[2]);
 

@@ -1,27 +1,27 @@
-/* Vertices and UVs of meshes whose charts have their places. */
-#include "unwrap/pack.h"
+/* Vertices and UVs of meshes, once their charts have places. */
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
-#include "mesh/weld.h"
+#include "mesh/edges.h"
 
 #include <stdlib.h>
 
 static const char what[] = "an atlas";
 
 struct vsh_atlas {
-    uint32_t *sources, *indices; /* [3 triangles of all shapes]: instances share them */
-    float (*uvs)[2];             /* of the vertices of all meshes */
+    uint32_t *sources, *indices; /* [3 triangles of all shapes], one block: instances share them */
+    float (*uvs)[2];             /* of the vertices of all meshes; with mesh_charts one block */
     uint32_t *mesh_charts;       /* [triangles of all meshes] */
-    vsh_atlas_mesh *meshes;      /* [mesh_count]: parts of these arrays */
+    vsh_atlas_mesh *meshes;      /* [mesh_count]: parts of these arrays; with charts one block */
+    vsh_atlas_chart *charts;     /* [info.charts] */
     size_t mesh_count;
-    vsh_atlas_chart *charts; /* [info.charts] */
-    vsh_atlas_page *pages;   /* [info.pages] */
+    vsh_atlas_page *pages; /* [info.pages] */
     vsh_atlas_info info;
 };
 
 /* --- vertices of a shape */
 
-/* Vertices of charts come first, chart by chart; then those of triangles without area. */
+/* Vertices of charts come first, chart by chart; then vertices of triangles without area. */
 typedef struct vertices {
     uint32_t *sources, *indices; /* the atlas's */
     uint32_t *chart;             /* [chart_vertices]: of the shape, from 0 */
@@ -32,15 +32,16 @@ typedef struct vertices {
 typedef struct making {
     struct vsh_atlas *atlas;
     const vshi_shapes *shapes;
-    vertices *vertices;             /* [shapes] */
+    vertices *vertices;             /* [shapes]; one block with the arrays below */
     uint32_t *chart, *patch_vertex; /* [3 triangles of all shapes] */
-    uint32_t *last;     /* [most vertices of a patch]: the last that was made of each, + 1; 0: none */
-    uint32_t *before;   /* [3 triangles]: the one that was made before each, + 1 */
+    uint32_t *last;     /* [most vertices of a patch]: 1 + the last vertex made of each; 0: none */
+    uint32_t *before;   /* [3 triangles]: 1 + the vertex made before each */
     float (*placed)[2]; /* [most vertices of a patch] */
 } making;
 
-/* The vertex that a patch's vertex is made into: one for each vertex of the mesh that its corners have. */
-static uint32_t vertex_of(const making *m, vertices *made, uint32_t chart, uint32_t vertex, uint32_t source) {
+/* The atlas's vertex for a vertex of a patch and one of the mesh, which is made if needed. */
+static uint32_t find_vertex(const making *m, vertices *made, uint32_t chart, uint32_t vertex,
+                            uint32_t source) {
     for (uint32_t v = m->last[vertex]; v != 0; v = m->before[v - 1]) {
         if (made->sources[v - 1] == source) {
             return v - 1;
@@ -66,7 +67,7 @@ static void number_vertices(const making *m, const vshi_shape *shape, vertices *
         memset(m->last, 0, p->vertex_count * sizeof *m->last);
         for (uint32_t i = 0; i < 3 * p->count; ++i) {
             const size_t corner = 3 * (size_t)p->triangles[i / 3] + i % 3;
-            made->indices[corner] = vertex_of(m, made, c, p->corner[i / 3][i % 3], given[corner]);
+            made->indices[corner] = find_vertex(m, made, c, p->corner[i / 3][i % 3], given[corner]);
         }
     }
     made->chart_vertices = made->count;
@@ -88,15 +89,16 @@ static vsh_result number_all(making *m, vsh_error *error) {
             most = shape->patches.list[c].vertex_count > most ? shape->patches.list[c].vertex_count : most;
         }
     }
-    const vshi_array arrays[] = {VSHI_ARRAY(m->vertices, m->shapes->count),
-                                 VSHI_ARRAY(m->last, most),
-                                 VSHI_ARRAY(m->placed, most),
-                                 VSHI_ARRAY(m->chart, 3 * triangles),
-                                 VSHI_ARRAY(m->patch_vertex, 3 * triangles),
-                                 VSHI_ARRAY(m->before, 3 * triangles),
-                                 VSHI_ARRAY(m->atlas->sources, 3 * triangles),
-                                 VSHI_ARRAY(m->atlas->indices, 3 * triangles)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
+    const vshi_array own[] = {VSHI_ARRAY(m->vertices, m->shapes->count),
+                              VSHI_ARRAY(m->last, most),
+                              VSHI_ARRAY(m->placed, most),
+                              VSHI_ARRAY(m->chart, 3 * triangles),
+                              VSHI_ARRAY(m->patch_vertex, 3 * triangles),
+                              VSHI_ARRAY(m->before, 3 * triangles)};
+    const vshi_array made[] = {VSHI_ARRAY(m->atlas->sources, 3 * triangles),
+                               VSHI_ARRAY(m->atlas->indices, 3 * triangles)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(own, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(made, what, error));
     for (size_t i = 0, at = 0; i < m->shapes->count; ++i) {
         const vshi_shape *shape = &m->shapes->list[i];
         m->vertices[i] = (vertices){.sources = m->atlas->sources + at,
@@ -109,7 +111,7 @@ static vsh_result number_all(making *m, vsh_error *error) {
     return VSH_OK;
 }
 
-/* --- places in 32-bit UVs */
+/* --- rounding to 32-bit UVs */
 
 static const double LEAST_STEP = 0x1p-24; /* half of a last place just below 1 */
 
@@ -125,8 +127,8 @@ typedef struct settling {
     uint32_t *begin, *around; /* around[begin[v] …]: corners at vertex v */
 } settling;
 
-/* Not positive: flipped, or without area. Exact but for the last rounding, which keeps the sign: differences
- * and products of floats of one range are doubles. */
+/* Whether a triangle is flipped, or without area. The sign is exact: differences and products of floats of
+ * one range are doubles. */
 static bool is_bad(const vshi_patch *p, float (*const uvs)[2], uint32_t i) {
     const float *a = uvs[p->corner[i][0]], *b = uvs[p->corner[i][1]], *c = uvs[p->corner[i][2]];
     return !(((double)b[0] - (double)a[0]) * ((double)c[1] - (double)a[1]) -
@@ -134,7 +136,6 @@ static bool is_bad(const vshi_patch *p, float (*const uvs)[2], uint32_t i) {
              0.0);
 }
 
-/* Bad triangles around a vertex. */
 static uint32_t count_bad(const settling *s, uint32_t v) {
     uint32_t bad = 0;
     for (uint32_t i = s->begin[v]; i < s->begin[v + 1]; ++i) {
@@ -143,8 +144,8 @@ static uint32_t count_bad(const settling *s, uint32_t v) {
     return bad;
 }
 
-/* Moves a vertex to where fewer triangles around it are bad, if it finds such a place. */
-static void move(settling *s, uint32_t v) {
+/* Moves a vertex by a few last places so that fewer triangles around it are bad, if possible. */
+static void move_vertex(settling *s, uint32_t v) {
     static const int ways[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {-1, -1}, {1, -1}, {-1, 1}};
     if (s->begin[v + 1] - s->begin[v] > MOST_AROUND) {
         return;
@@ -171,13 +172,11 @@ static void move(settling *s, uint32_t v) {
     uv[1] = best[1];
 }
 
-/* Triangles that rounding has flipped or flattened, slivers all of them, are turned right by moving a corner
- * by some last places: uvs[vertex_count] of the patch, 0 … 1. Some may stay. */
+/* Repairs slivers that rounding to uvs[vertex_count] has flipped or flattened. Some may stay. */
 static vsh_result settle(const vshi_patch *p, float (*uvs)[2], vsh_error *error) {
     settling s = {.patch = p, .uvs = uvs};
     const vshi_array arrays[] = {VSHI_ARRAY(s.begin, (size_t)p->vertex_count + 2),
                                  VSHI_ARRAY(s.around, 3 * (size_t)p->count)};
-    vsh_result result;
     uint32_t bad = 0;
     for (uint32_t i = 0; i < p->count; ++i) {
         bad += is_bad(p, uvs, i);
@@ -185,29 +184,29 @@ static vsh_result settle(const vshi_patch *p, float (*uvs)[2], vsh_error *error)
     if (bad == 0) {
         return VSH_OK;
     }
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     vshi_list_groups(p->corner[0], 3 * (size_t)p->count, p->vertex_count, s.begin, s.around);
     for (int pass = 0; pass < PASSES && bad > 0; ++pass) {
         bad = 0;
         for (uint32_t i = 0; i < p->count; ++i) {
             for (int k = 0; k < 3 && is_bad(p, uvs, i); ++k) {
-                move(&s, p->corner[i][k]);
+                move_vertex(&s, p->corner[i][k]);
             }
             bad += is_bad(p, uvs, i);
         }
     }
-done:
-    free(s.around);
     free(s.begin);
-    return result;
+    return VSH_OK;
 }
 
 /* --- meshes */
 
 /* UVs of a mesh's vertices, chart by chart, and the charts of its triangles. */
-static vsh_result place_vertices(const making *m, const vshi_shape *shape, const vertices *made,
-                                 const vshi_item *items, uint32_t first_chart, float (*uvs)[2],
-                                 uint32_t *mesh_charts, vsh_error *error) {
+static vsh_result place_mesh(const making *m, size_t mesh, const vshi_pack_item *items, uint32_t first_chart,
+                             float (*uvs)[2], uint32_t *mesh_charts, vsh_error *error) {
+    const uint32_t number = m->shapes->instances[mesh].shape;
+    const vshi_shape *shape = &m->shapes->list[number];
+    const vertices *made = &m->vertices[number];
     size_t vertex = 0;
     for (uint32_t c = 0; c < shape->patches.count; ++c) {
         const vshi_patch *p = &shape->patches.list[c];
@@ -230,7 +229,7 @@ static vsh_result place_vertices(const making *m, const vshi_shape *shape, const
     return VSH_OK;
 }
 
-static vsh_result place_all(const making *m, const vshi_item *items, vsh_error *error) {
+static vsh_result place_all(const making *m, const vshi_pack_item *items, vsh_error *error) {
     struct vsh_atlas *a = m->atlas;
     const vshi_shapes *shapes = m->shapes;
     size_t vertex_count = 0, triangle_count = 0;
@@ -238,8 +237,9 @@ static vsh_result place_all(const making *m, const vshi_item *items, vsh_error *
         vertex_count += m->vertices[shapes->instances[i].shape].count;
         triangle_count += shapes->meshes[i].triangle_count;
     }
-    VSHI_TRY(vshi_allocate((void **)&a->uvs, vertex_count, sizeof *a->uvs, what, error));
-    VSHI_TRY(vshi_allocate((void **)&a->mesh_charts, triangle_count, sizeof *a->mesh_charts, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(a->uvs, vertex_count),
+                                 VSHI_ARRAY(a->mesh_charts, triangle_count)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (size_t i = 0; i < triangle_count; ++i) {
         a->mesh_charts[i] = VSH_NO_CHART;
     }
@@ -249,7 +249,7 @@ static vsh_result place_all(const making *m, const vshi_item *items, vsh_error *
         const vshi_shape *shape = &shapes->list[shapes->instances[i].shape];
         const vertices *made = &m->vertices[shapes->instances[i].shape];
         const size_t triangles = shape->mesh->triangle_count;
-        VSHI_TRY(place_vertices(m, shape, made, items + chart, chart, uvs, charts, error));
+        VSHI_TRY(place_mesh(m, i, items + chart, chart, uvs, charts, error));
         a->meshes[i] = (vsh_atlas_mesh){uvs[0], made->sources, made->indices, charts, made->count, triangles};
         a->info.flat_triangles += (made->count - made->chart_vertices) / 3;
         a->info.kept += shape->kept;
@@ -260,19 +260,13 @@ static vsh_result place_all(const making *m, const vshi_item *items, vsh_error *
     return VSH_OK;
 }
 
-/* Stretch of a chart as it was fitted to texels: L2 of the patch, times that of its sides' factors. */
-static double fitted_stretch(const vshi_item *item) {
-    const double uneven = item->at.fit.uneven;
-    return item->patch->stretch * sqrt(0.5 * (uneven + 1.0 / uneven));
-}
-
-static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale, uint32_t chart) {
+static void describe_chart(struct vsh_atlas *a, const vshi_pack_item *item, double scale, uint32_t chart) {
     const bool sideways = item->at.quarters % 2 != 0;
-    const double stretch = fitted_stretch(item);
+    const double uneven = item->at.fit.uneven; /* fitting to texels stretches, too */
     a->charts[chart] = (vsh_atlas_chart){
         .page = item->at.page,
         .mesh = item->mesh,
-        .stretch = (float)stretch,
+        .stretch = (float)(item->patch->stretch * sqrt(0.5 * (uneven + 1.0 / uneven))),
         .area = item->patch->area * scale * scale,
         .min = {item->at.x, item->at.y},
         .max = {item->at.x + (sideways ? item->at.fit.height : item->at.fit.width),
@@ -283,7 +277,7 @@ static void chart_make(struct vsh_atlas *a, const vshi_item *item, double scale,
     page->covered += (double)item->at.touched;
 }
 
-/* Sums over all pages, and shares of the texels that were counted. */
+/* Sums up the pages, and turns each page's count of texels into a share. */
 static void sum_pages(struct vsh_atlas *a) {
     double texels = 0.0, touched = 0.0;
     a->info.texels_per_unit = INFINITY;
@@ -300,7 +294,7 @@ static void sum_pages(struct vsh_atlas *a) {
     a->info.covered = touched / texels;
 }
 
-vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const vshi_item *items,
+vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const vshi_pack_item *items,
                            size_t item_count, vsh_atlas **atlas, vsh_error *error) {
     making m = {.shapes = shapes};
     double area = 0.0, stretch = 0.0;
@@ -308,17 +302,19 @@ vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const v
     VSHI_TRY(vshi_allocate((void **)&m.atlas, 1, sizeof *m.atlas, what, error));
     struct vsh_atlas *a = m.atlas;
     a->mesh_count = shapes->mesh_count;
-    a->info = (vsh_atlas_info){
-        .charts = item_count, .pages = (uint32_t)pages->count, .shared = shapes->mesh_count - shapes->count};
+    a->info = (vsh_atlas_info){.meshes = shapes->mesh_count,
+                               .charts = item_count,
+                               .pages = (uint32_t)pages->count,
+                               .shared = shapes->mesh_count - shapes->count};
     a->pages = pages->list;
     *pages = (vshi_pages){NULL, 0};
-    VSHI_TRY_DONE(vshi_allocate((void **)&a->meshes, a->mesh_count, sizeof *a->meshes, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&a->charts, item_count, sizeof *a->charts, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(a->meshes, a->mesh_count), VSHI_ARRAY(a->charts, item_count)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     VSHI_TRY_DONE(number_all(&m, error));
     VSHI_TRY_DONE(place_all(&m, items, error));
     for (uint32_t i = 0; i < item_count; ++i) {
         const vshi_instance *instance = &shapes->instances[items[i].mesh];
-        chart_make(a, &items[i], shapes->list[instance->shape].surface.scale * instance->scale, i);
+        describe_chart(a, &items[i], shapes->list[instance->shape].surface.scale * instance->scale, i);
         area += a->charts[i].area;
         stretch += a->charts[i].area * (double)a->charts[i].stretch;
         a->info.worst_stretch = fmax(a->info.worst_stretch, (double)a->charts[i].stretch);
@@ -326,11 +322,6 @@ vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const v
     sum_pages(a);
     a->info.stretch = area > 0.0 ? stretch / area : 1.0;
 done:
-    free(m.placed);
-    free(m.before);
-    free(m.last);
-    free(m.patch_vertex);
-    free(m.chart);
     free(m.vertices);
     *atlas = result == VSH_OK ? a : NULL;
     if (result != VSH_OK) {
@@ -344,25 +335,10 @@ void vsh_atlas_free(vsh_atlas *a) {
         return;
     }
     free(a->pages);
-    free(a->charts);
     free(a->meshes);
-    free(a->mesh_charts);
     free(a->uvs);
-    free(a->indices);
     free(a->sources);
     free(a);
-}
-
-size_t vsh_atlas_mesh_count(const vsh_atlas *atlas) {
-    return atlas->mesh_count;
-}
-
-size_t vsh_atlas_chart_count(const vsh_atlas *atlas) {
-    return (size_t)atlas->info.charts;
-}
-
-size_t vsh_atlas_page_count(const vsh_atlas *atlas) {
-    return atlas->info.pages;
 }
 
 void vsh_atlas_get_info(const vsh_atlas *atlas, vsh_atlas_info *info) {

@@ -1,20 +1,16 @@
-#include "unwrap/cut_mesh.h"
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
 #include "mesh/edges.h"
-#include "mesh/weld.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Cosines of angles between normals. */
-static const double CREASE =
-    0.64; /* 50°: a chart is cut there; sides of a round column of eight faces are 45° */
-static const double SMOOTH =
-    -0.6; /* 127°: where shading normals go on over the edge, as of a bar of three sides */
-static const double PLANE = 0.9999995; /* 0.06°: of one plane; stretch of a projection is then 1 + 5e-7 */
-static const double QUAD = 0.9;        /* 26°: halves of a quad that is not flat, found by shape */
-static const double SEAM = 0.985;      /* 10° between shading normals of a vertex: modelled as an edge */
+/* Cosines of angles between normals. CREASE, 50°: cuts a chart; the sides of a column of eight faces are 45°
+ * apart. SMOOTH, 127°: the same where shading normals continue over the edge, as of a bar of three sides.
+ * PLANE, 0.06°: one plane, whose projection is stretched by 1 + 5e-7. QUAD, 26°: halves of a bent quad, found
+ * by shape. SEAM, 10° between shading normals of a vertex: modelled as an edge. */
+static const double CREASE = 0.64, SMOOTH = -0.6, PLANE = 0.9999995, QUAD = 0.9, SEAM = 0.985;
 
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
     /* 170 a triangle, of which mesh/edges.c gives 130 back; then patches, trials and their equations */
@@ -87,7 +83,7 @@ static void cut_sides(vshi_cut_mesh *s, const vshi_edges *edges, bool by_uvs) {
     }
 }
 
-/* The only side of a triangle whose neighbour shares the two vertices, or VSHI_NONE. */
+/* The only side of a triangle whose neighbour shares both vertices, or VSHI_NONE. */
 static uint32_t find_shared_side(const vshi_cut_mesh *s, uint32_t triangle) {
     const uint32_t *indices = s->mesh->indices;
     uint32_t shared = VSHI_NONE;
@@ -133,8 +129,8 @@ static uint32_t gather_plane(vshi_cut_mesh *s, uint32_t first, uint32_t unit, ui
     return waiting;
 }
 
-/* The side of a triangle that is a quad's diagonal if it is half of one: the longest. */
-static uint32_t longest_side(const vshi_cut_mesh *s, uint32_t triangle) {
+/* If the triangle is half of a quad, this side is the diagonal. */
+static uint32_t find_longest_side(const vshi_cut_mesh *s, uint32_t triangle) {
     uint32_t best = 3 * triangle;
     double most = -1.0;
     for (uint32_t side = 3 * triangle; side < 3 * triangle + 3; ++side) {
@@ -147,22 +143,20 @@ static uint32_t longest_side(const vshi_cut_mesh *s, uint32_t triangle) {
     return best;
 }
 
-/* The other half of a quad that is not flat: where both have their longest side in common, or as files have
- * quads, one after the other. */
-static uint32_t other_half(const vshi_cut_mesh *s, uint32_t triangle) {
-    const uint32_t diagonal = s->partner[longest_side(s, triangle)];
+/* The other half of a bent quad: the triangle that shares its longest side. Else VSHI_NONE. */
+static uint32_t find_bent_half(const vshi_cut_mesh *s, uint32_t triangle) {
+    const uint32_t diagonal = s->partner[find_longest_side(s, triangle)];
     if (diagonal != VSHI_NONE && vshi_dot(s->normal[triangle], s->normal[diagonal / 3]) > QUAD &&
-        s->partner[longest_side(s, diagonal / 3)] / 3 == triangle) {
+        s->partner[find_longest_side(s, diagonal / 3)] / 3 == triangle) {
         return diagonal / 3;
     }
     return VSHI_NONE;
 }
 
 static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
-    uint32_t *queue = NULL, *size = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&queue, s->count, sizeof *queue, "parts of planes", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&size, s->count, sizeof *size, "parts of planes", error));
+    uint32_t *queue, *size;
+    const vshi_array arrays[] = {VSHI_ARRAY(queue, s->count), VSHI_ARRAY(size, s->count)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "parts of planes", error));
     memset(s->unit, 0xff, s->count * sizeof *s->unit);
     uint32_t units = 0;
     /* bent quads come first, so that none of their halves joins the plane of a neighbour */
@@ -188,7 +182,7 @@ static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
         if (unit == VSHI_NONE || renamed[unit] != VSHI_NONE) {
             continue;
         }
-        const uint32_t half = size[unit] == 1 ? other_half(s, i) : VSHI_NONE;
+        const uint32_t half = size[unit] == 1 ? find_bent_half(s, i) : VSHI_NONE;
         renamed[unit] = s->unit_count++;
         if (half != VSHI_NONE && size[s->unit[half]] == 1 && renamed[s->unit[half]] == VSHI_NONE) {
             renamed[s->unit[half]] = renamed[unit];
@@ -197,10 +191,8 @@ static vsh_result gather_units(vshi_cut_mesh *s, vsh_error *error) {
     for (uint32_t i = 0; i < s->count; ++i) {
         s->unit[i] = s->unit[i] != VSHI_NONE ? renamed[s->unit[i]] : VSHI_NONE;
     }
-done:
-    free(size);
     free(queue);
-    return result;
+    return VSH_OK;
 }
 
 vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, bool by_uvs, vshi_cut_mesh *s,
@@ -212,7 +204,7 @@ vsh_result vshi_cut_mesh_make(const vsh_mesh *mesh, size_t index, bool by_uvs, v
         VSHI_ARRAY(s->normal, s->count),          VSHI_ARRAY(s->partner, 3 * s->count),
         VSHI_ARRAY(s->soft, 3 * s->count),        VSHI_ARRAY(s->unit, s->count),
         VSHI_ARRAY(s->unit_begin, s->count + 2),  VSHI_ARRAY(s->unit_list, s->count)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "a mesh's charts", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "a mesh's charts", error));
     if (s->count == 0) {
         return VSH_OK;
     }
@@ -231,13 +223,6 @@ done:
 }
 
 void vshi_cut_mesh_free(vshi_cut_mesh *s) {
-    free(s->unit_list);
-    free(s->unit_begin);
-    free(s->unit);
-    free(s->soft);
-    free(s->partner);
-    free(s->normal);
-    free(s->area);
     free(s->place);
     *s = (vshi_cut_mesh){0};
 }

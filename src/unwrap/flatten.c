@@ -1,7 +1,8 @@
-#include "unwrap/patch.h"
+/* Charts laid out flat: by least squares conformal maps, then as rigid as possible. */
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
-#include "mesh/weld.h"
+#include "mesh/edges.h"
 
 #include <complex.h>
 #include <stdlib.h>
@@ -12,27 +13,28 @@
 
 static const char what[] = "laying out a chart";
 
-static const double PLANAR =
-    0.9999985; /* cosine, 0.1°: projected along the mean, stretched by 1 + 2e-6 at most */
+/* Cosine of 0.1°: triangles closer to the mean normal are projected, stretched by 1 + 2e-6 at most. */
+static const double PLANAR = 0.9999985;
 static const double LEAST_COTANGENT = 0.02; /* of ARAP's weights: negative ones would fold triangles */
 static const double GOOD = 1.002;           /* stretch that needs no more iterations */
-static const double GAIN = 1e-3;            /* that an iteration is worth */
+static const double GAIN = 1e-3;            /* of stretch, by an iteration that is worth another */
 
 enum { ITERATIONS = 10 };
 
-/* --- Hermitian systems over the edges of a mesh: a complex unknown at each vertex.
- * Up-looking LDLᴴ: each row of the factor by a triangular solve with the rows before, whose pattern is read
- * off the elimination tree (Liu, "The role of elimination trees in sparse factorization", 1990). */
+/* --- Hermitian systems over the edges of a mesh, with a complex unknown at each vertex.
+ * Up-looking LDLᴴ: each row of the factor is solved from the rows before it. The elimination tree gives the
+ * pattern (Liu, "The role of elimination trees in sparse factorization", 1990). */
 
-/* The product: that of the language looks for numbers that are none. */
-static double complex times(double complex a, double complex b) {
+/* The language's own product is slower, as it checks for NaN. */
+static double complex multiply(double complex a, double complex b) {
     return CMPLX(creal(a) * creal(b) - cimag(a) * cimag(b), creal(a) * cimag(b) + cimag(a) * creal(b));
 }
 
 /* Rows and columns stand in the order in which they are eliminated. */
 typedef struct sparse {
     uint32_t count;
-    uint32_t *order;  /* [count]: the row of each vertex */
+    uint32_t *order;  /* [count]: the row of each vertex; one block with all arrays but `column`, `value`,
+                         `factor_row` and `factor` */
     uint32_t *begin;  /* [count + 1] in `column`: entries of each row left of the diagonal */
     uint32_t *column; /* ascending in each row */
     double complex *value;
@@ -48,7 +50,7 @@ typedef struct sparse {
 
 /* The vertices beside vertex v: others[2 first[v]] … others[end[v] - 1], ascending, each once. */
 typedef struct adjacency {
-    uint32_t *first;   /* [vertex_count + 2] in `corners` */
+    uint32_t *first;   /* [vertex_count + 2] in `corners`; one block with the arrays below */
     uint32_t *corners; /* [3 triangles], by vertex */
     uint32_t *end;     /* [vertex_count] */
     uint32_t *others;  /* [6 triangles] */
@@ -107,9 +109,9 @@ static void number(dissecting *d, const part *p) {
     }
 }
 
-/* `turned`: before is beyond, for where one vertex beyond, the tip of a fan, touches all that is before.
- * Sorts a part's vertices into those before a plane, those beyond it, and those before it that touch them,
- * which come last. Returns false where that parts nothing. */
+/* Sorts a part's vertices into those before a plane, those beyond it, and those before it that touch these.
+ * `turned` exchanges before and beyond, for the tip of a fan that touches everything. Returns false if the
+ * plane parts nothing. */
 static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part halves[2]) {
     double middle;
     const int axis = find_plane(d, p, &middle);
@@ -134,13 +136,11 @@ static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part ha
         }
     }
     if (near == p->begin || beyond == 0) {
-        uint32_t at = p->begin +
-                      beyond; /* all that is before it touches it, or nothing is: the list as a whole again */
-        for (uint32_t i = p->begin; i < near; ++i) {
-            d->list[at++] = d->other[i];
-        }
-        for (uint32_t i = between; i < p->end; ++i) {
-            d->list[at++] = d->other[i];
+        uint32_t at = p->begin + beyond; /* the list keeps all its vertices */
+        for (uint32_t i = p->begin; i < p->end; ++i) {
+            if (i < near || i >= between) {
+                d->list[at++] = d->other[i];
+            }
         }
         return false;
     }
@@ -155,7 +155,7 @@ static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part ha
     const part border = {between, p->end, p->row + (between - p->begin), 0};
     number(d, &border);
     for (uint32_t i = between; i < p->end; ++i) {
-        d->side[d->list[i]] = UINT32_MAX; /* in no part any more */
+        d->side[d->list[i]] = UINT32_MAX; /* no longer in a part */
     }
     return true;
 }
@@ -169,8 +169,7 @@ static vsh_result dissect(const adjacency *neighbours, const vshi_vec *place, ui
     part stack[DEEPEST + 2];
     size_t waiting = 0;
     uint32_t tag = 0;
-    vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (uint32_t v = 0; v < count; ++v) {
         d.list[v] = v;
         d.side[v] = UINT32_MAX;
@@ -186,31 +185,27 @@ static vsh_result dissect(const adjacency *neighbours, const vshi_vec *place, ui
         }
         ++tag;
     }
-done:
-    free(d.other);
-    free(d.side);
     free(d.list);
-    return result;
+    return VSH_OK;
 }
 
 /* --- the system */
 
-/* Each vertex is listed at those beside it, in its turn: so lists ascend, and no vertex of many edges makes
- * sorting slow. */
-static vsh_result find_neighbours(const uint32_t (*triangles)[3], uint32_t count, uint32_t vertex_count,
-                                  adjacency *a, vsh_error *error) {
-    const size_t corners = 3 * (size_t)count;
+/* Each vertex in turn is added to the lists of its neighbours. So lists ascend without being sorted. */
+static vsh_result find_neighbours(const vshi_patch *p, adjacency *a, vsh_error *error) {
+    const uint32_t vertex_count = p->vertex_count;
+    const size_t corners = 3 * (size_t)p->count;
     const vshi_array arrays[] = {VSHI_ARRAY(a->first, (size_t)vertex_count + 2),
                                  VSHI_ARRAY(a->corners, corners), VSHI_ARRAY(a->end, vertex_count),
                                  VSHI_ARRAY(a->others, 2 * corners)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
-    vshi_list_groups(triangles[0], corners, vertex_count, a->first, a->corners);
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    vshi_list_groups(p->corner[0], corners, vertex_count, a->first, a->corners);
     for (uint32_t v = 0; v < vertex_count; ++v) {
         a->end[v] = 2 * a->first[v];
     }
     for (uint32_t v = 0; v < vertex_count; ++v) {
         for (uint32_t i = 2 * a->first[v]; i < 2 * a->first[v + 1]; ++i) {
-            const uint32_t corner = a->corners[i / 2], w = triangles[corner / 3][(corner + 1 + i % 2) % 3];
+            const uint32_t corner = a->corners[i / 2], w = p->corner[corner / 3][(corner + 1 + i % 2) % 3];
             if (a->end[w] == 2 * a->first[w] || a->others[a->end[w] - 1] != v) {
                 a->others[a->end[w]++] = v;
             }
@@ -220,7 +215,7 @@ static vsh_result find_neighbours(const uint32_t (*triangles)[3], uint32_t count
 }
 
 static vsh_result fill_rows(sparse *m, const adjacency *a, vsh_error *error) {
-    uint32_t *vertex = m->marks, *end = m->filled; /* which are not needed yet */
+    uint32_t *vertex = m->marks, *end = m->filled; /* not needed yet */
     for (uint32_t v = 0; v < m->count; ++v) {
         vertex[m->order[v]] = v;
         for (uint32_t i = 2 * a->first[v]; i < a->end[v]; ++i) {
@@ -231,9 +226,9 @@ static vsh_result fill_rows(sparse *m, const adjacency *a, vsh_error *error) {
         end[r] = m->begin[r];
         m->begin[r + 1] += m->begin[r];
     }
-    const uint32_t entries = m->begin[m->count];
-    VSHI_TRY(vshi_allocate((void **)&m->column, entries, sizeof *m->column, what, error));
-    VSHI_TRY(vshi_allocate((void **)&m->value, entries, sizeof *m->value, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(m->column, m->begin[m->count]),
+                                 VSHI_ARRAY(m->value, m->begin[m->count])};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (uint32_t column = 0; column < m->count; ++column) {
         const uint32_t v = vertex[column];
         for (uint32_t i = 2 * a->first[v]; i < a->end[v]; ++i) {
@@ -269,14 +264,14 @@ static vsh_result plan_factor(sparse *m, vsh_error *error) {
         }
         m->factor_begin[c + 1] = (uint32_t)entries;
     }
-    VSHI_TRY(vshi_allocate((void **)&m->factor_row, entries, sizeof *m->factor_row, what, error));
-    return vshi_allocate((void **)&m->factor, entries, sizeof *m->factor, what, error);
+    const vshi_array arrays[] = {VSHI_ARRAY(m->factor_row, entries), VSHI_ARRAY(m->factor, entries)};
+    return VSHI_ALLOCATE_BLOCK(arrays, what, error);
 }
 
-/* A system whose entries are the edges of triangles[count][3] with `vertex_count` vertices at `place`; all
- * values are 0. Errors: VSH_ERROR_MEMORY. Free with sparse_free(), after a failure too. */
-static vsh_result sparse_make(const uint32_t (*triangles)[3], uint32_t count, const vshi_vec *place,
-                              uint32_t vertex_count, sparse *m, vsh_error *error) {
+/* A system whose entries are the edges of the patch; all values are 0. Errors: VSH_ERROR_MEMORY. Free with
+ * sparse_free(), after a failure too. */
+static vsh_result sparse_make(const vshi_patch *p, sparse *m, vsh_error *error) {
+    const uint32_t vertex_count = p->vertex_count;
     *m = (sparse){.count = vertex_count};
     adjacency a = {NULL, NULL, NULL, NULL};
     vsh_result result;
@@ -290,35 +285,20 @@ static vsh_result sparse_make(const uint32_t (*triangles)[3], uint32_t count, co
                                  VSHI_ARRAY(m->marks, vertex_count),
                                  VSHI_ARRAY(m->stack, vertex_count),
                                  VSHI_ARRAY(m->filled, vertex_count)};
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
-    VSHI_TRY_DONE(find_neighbours(triangles, count, vertex_count, &a, error));
-    VSHI_TRY_DONE(dissect(&a, place, vertex_count, m->order, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    VSHI_TRY_DONE(find_neighbours(p, &a, error));
+    VSHI_TRY_DONE(dissect(&a, p->place, vertex_count, m->order, error));
     VSHI_TRY_DONE(fill_rows(m, &a, error));
     VSHI_TRY_DONE(plan_factor(m, error));
 done:
-    free(a.others);
-    free(a.end);
-    free(a.corners);
     free(a.first);
     return result;
 }
 
 static void sparse_free(sparse *m) {
-    free(m->filled);
-    free(m->stack);
-    free(m->marks);
-    free(m->work);
-    free(m->pivot);
-    free(m->factor);
     free(m->factor_row);
-    free(m->factor_begin);
-    free(m->parent);
-    free(m->diagonal);
-    free(m->value);
     free(m->column);
-    free(m->begin);
     free(m->order);
-    *m = (sparse){0};
 }
 
 static void sparse_clear(sparse *m) {
@@ -354,21 +334,21 @@ static void sparse_add_diagonal(sparse *m, uint32_t vertex, double value) {
     m->diagonal[m->order[vertex]] += value;
 }
 
-/* Fixes a vertex at a value: its row becomes that of the identity, and what others have of it goes to their
- * right sides. Before the factoring. */
+/* Fixes a vertex at a value, before factoring: its row becomes the identity's, and its terms in other rows
+ * move to the right sides. */
 static void sparse_pin(sparse *m, uint32_t vertex, double complex value, double complex *right) {
     const uint32_t pinned = m->order[vertex];
-    for (uint32_t v = 0; v < m->count; ++v) { /* `work` holds the right side by rows for a while */
+    for (uint32_t v = 0; v < m->count; ++v) { /* `work` holds the right side by rows */
         m->work[m->order[v]] = right[v];
     }
     for (uint32_t i = m->begin[pinned]; i < m->begin[pinned + 1]; ++i) {
-        m->work[m->column[i]] -= times(conj(m->value[i]), value);
+        m->work[m->column[i]] -= multiply(conj(m->value[i]), value);
         m->value[i] = 0.0;
     }
     for (uint32_t row = pinned + 1; row < m->count; ++row) {
         for (uint32_t i = m->begin[row]; i < m->begin[row + 1]; ++i) {
             if (m->column[i] == pinned) {
-                m->work[row] -= times(m->value[i], value);
+                m->work[row] -= multiply(m->value[i], value);
                 m->value[i] = 0.0;
             }
         }
@@ -380,9 +360,9 @@ static void sparse_pin(sparse *m, uint32_t vertex, double complex value, double 
     }
 }
 
-/* The columns that row `row` of the factor has entries in, each before those that depend on it, from the
- * returned place in `stack` on. */
-static uint32_t row_pattern(sparse *m, uint32_t row) {
+/* Lists the columns of a row of the factor, each before the columns that depend on it. They begin at the
+ * returned place of `stack`. */
+static uint32_t find_row_pattern(sparse *m, uint32_t row) {
     uint32_t top = m->count;
     m->marks[row] = row;
     for (uint32_t i = m->begin[row]; i < m->begin[row + 1]; ++i) {
@@ -398,7 +378,7 @@ static uint32_t row_pattern(sparse *m, uint32_t row) {
     return top;
 }
 
-/* False where the matrix is not positive definite, as far as doubles tell. */
+/* False if the matrix is not positive definite, within rounding. */
 static bool sparse_factor(sparse *m) {
     static const double LEAST = 1e-13; /* pivot over the diagonal's old value */
     for (uint32_t row = 0; row < m->count; ++row) {
@@ -407,7 +387,7 @@ static bool sparse_factor(sparse *m) {
         m->filled[row] = 0;
     }
     for (uint32_t row = 0; row < m->count; ++row) {
-        const uint32_t top = row_pattern(m, row);
+        const uint32_t top = find_row_pattern(m, row);
         for (uint32_t i = m->begin[row]; i < m->begin[row + 1]; ++i) {
             m->work[m->column[i]] = conj(m->value[i]);
         }
@@ -417,10 +397,10 @@ static bool sparse_factor(sparse *m) {
             const double complex y = m->work[c];
             m->work[c] = 0.0;
             for (uint32_t i = begin; i < end; ++i) {
-                m->work[m->factor_row[i]] -= times(m->factor[i], y);
+                m->work[m->factor_row[i]] -= multiply(m->factor[i], y);
             }
             const double complex l = conj(y) / m->pivot[c];
-            pivot -= creal(times(y, l));
+            pivot -= creal(multiply(y, l));
             m->factor_row[end] = row;
             m->factor[end] = l;
             ++m->filled[c];
@@ -442,13 +422,13 @@ static void sparse_solve(const sparse *m, double complex *right) {
     for (uint32_t c = 0; c < m->count; ++c) {
         const double complex y = x[c];
         for (uint32_t i = m->factor_begin[c]; i < m->factor_begin[c + 1]; ++i) {
-            x[m->factor_row[i]] -= times(m->factor[i], y);
+            x[m->factor_row[i]] -= multiply(m->factor[i], y);
         }
     }
     for (uint32_t c = m->count; c-- > 0;) {
         double complex y = x[c] * (1.0 / m->pivot[c]);
         for (uint32_t i = m->factor_begin[c]; i < m->factor_begin[c + 1]; ++i) {
-            y -= times(conj(m->factor[i]), x[m->factor_row[i]]);
+            y -= multiply(conj(m->factor[i]), x[m->factor_row[i]]);
         }
         x[c] = y;
     }
@@ -461,7 +441,8 @@ static void sparse_solve(const sparse *m, double complex *right) {
 
 typedef struct laying {
     vshi_patch *patch;
-    double complex (*flat)[3]; /* [count]: corners of each triangle in its own plane, the first at 0 */
+    double complex (*flat)[3]; /* [count]: corners of each triangle in its own plane, the first at 0; one
+                                  block with `x` and `best` */
     sparse system;
     double complex *x;   /* [vertex_count] */
     double (*best)[2];   /* [vertex_count]: the least stretched so far */
@@ -493,9 +474,9 @@ static bool project(vshi_patch *p) {
 
 /* --- measuring */
 
-/* 8 A² L2² of a triangle, A its area in UVs: the Dirichlet energy of the map from there to the surface, by
+/* 8 A² L2² of a triangle with area A in UVs: the Dirichlet energy of the map from UVs to the surface, by
  * cotangents (Pinkall and Polthier, 1993). */
-static double energy(const vshi_patch *p, uint32_t i) {
+static double find_energy(const vshi_patch *p, uint32_t i) {
     double sum = 0.0;
     for (int k = 0; k < 3; ++k) {
         const uint32_t a = p->corner[i][k], b = p->corner[i][(k + 1) % 3], c = p->corner[i][(k + 2) % 3];
@@ -515,7 +496,7 @@ bool vshi_flatten_measure(vshi_patch *p) {
             return false;
         }
         flat_area += 0.5 * doubled;
-        squares += energy(p, i) / (2.0 * doubled * doubled) * p->surface->area[p->triangles[i]];
+        squares += find_energy(p, i) / (2.0 * doubled * doubled) * p->surface->area[p->triangles[i]];
     }
     const double stretch = sqrt(squares * flat_area) / p->area;
     const double scale = sqrt(p->area / flat_area);
@@ -559,18 +540,18 @@ static void add_conformal(laying *l, uint32_t i) {
     for (int j = 0; j < 3; ++j) {
         const int k = (j + 1) % 3;
         sparse_add_diagonal(&l->system, corner[j], scalar_product(w[j], w[j]) / doubled);
-        sparse_add(&l->system, corner[j], corner[k], times(conj(w[j]), w[k]) * (1.0 / doubled));
+        sparse_add(&l->system, corner[j], corner[k], multiply(conj(w[j]), w[k]) * (1.0 / doubled));
     }
 }
 
-/* Two vertices far from each other: the ends of the box's longest side. */
+/* Two vertices far from each other: the ends of the longest side of the box. */
 static void find_pins(const vshi_patch *p, uint32_t pins[2]) {
     double longest = -1.0;
     for (int axis = 0; axis < 3; ++axis) {
         uint32_t low = 0, high = 0;
         double least = INFINITY, most = -INFINITY;
         for (uint32_t v = 0; v < p->vertex_count; ++v) {
-            const double x = axis == 0 ? p->place[v].x : axis == 1 ? p->place[v].y : p->place[v].z;
+            const double x = along(p->place[v], axis);
             if (x < least) {
                 least = x;
                 low = v;
@@ -636,7 +617,7 @@ static bool prepare_rigid(laying *l) {
         }
     }
     memset(l->x, 0, p->vertex_count * sizeof *l->x);
-    sparse_pin(&l->system, 0, 0.0, l->x); /* where it lies changes nothing */
+    sparse_pin(&l->system, 0, 0.0, l->x); /* any place will do */
     return sparse_factor(&l->system);
 }
 
@@ -652,13 +633,13 @@ static void step_rigid(laying *l) {
             weight[k] = cotangent(at, k);
             edge[k] = at[(k + 2) % 3] - at[(k + 1) % 3];
             const double complex now = CMPLX(c[0] - b[0], c[1] - b[1]);
-            turn += times(now, conj(edge[k])) * weight[k];
+            turn += multiply(now, conj(edge[k])) * weight[k];
         }
         const double length = sqrt(scalar_product(turn, turn));
         turn = length > 0.0 ? turn * (1.0 / length) : 1.0;
         for (int k = 0; k < 3; ++k) {
             const uint32_t b = p->corner[i][(k + 1) % 3], c = p->corner[i][(k + 2) % 3];
-            const double complex to = times(turn, edge[k]) * weight[k];
+            const double complex to = multiply(turn, edge[k]) * weight[k];
             l->x[b] -= to;
             l->x[c] += to;
         }
@@ -674,7 +655,7 @@ static void keep_best(laying *l) {
     }
 }
 
-/* Steps from where LSCM, or a fold, left it until they gain little. */
+/* Iterates, from the result of LSCM, until a step gains little. */
 static void lay_rigid(laying *l) {
     double before = INFINITY;
     if (!prepare_rigid(l)) {
@@ -697,9 +678,8 @@ static vsh_result lay(laying *l, vsh_error *error) {
     vshi_patch *p = l->patch;
     const vshi_array arrays[] = {VSHI_ARRAY(l->flat, p->count), VSHI_ARRAY(l->x, p->vertex_count),
                                  VSHI_ARRAY(l->best, p->vertex_count)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
-    VSHI_TRY(
-        sparse_make((const uint32_t(*)[3])p->corner, p->count, p->place, p->vertex_count, &l->system, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    VSHI_TRY(sparse_make(p, &l->system, error));
     flatten_triangles(l);
     const bool laid = lay_conformal(l);
     if (laid && vshi_flatten_measure(p)) {
@@ -726,8 +706,6 @@ vsh_result vshi_flatten(vshi_patch *p, double max_stretch, bool *flat, vsh_error
             p->stretch = l.best_stretch;
         }
         sparse_free(&l.system);
-        free(l.best);
-        free(l.x);
         free(l.flat);
         VSHI_TRY(result);
         if (!unfolded) {

@@ -2,36 +2,74 @@
  * make charts round and their borders straight, as in Young's and Castaño's chart growers. A first partition
  * grows one chart after the other, from the largest unit that is left, as far as normals allow. Then all
  * charts grow again at once, from the unit in the middle of each, which evens them out. */
-#include "unwrap/cut_mesh.h"
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
-#include "unwrap/heap.h"
 
 #include <stdlib.h>
 #include <string.h>
 
 static const char what[] = "growing charts";
 
+/* --- a heap */
+
+static bool comes_before(const vshi_heap_entry *a, const vshi_heap_entry *b) {
+    if (a->key != b->key) {
+        return a->key < b->key;
+    }
+    return a->what != b->what ? a->what < b->what : a->by < b->by;
+}
+
+vsh_result vshi_heap_push(vshi_heap *heap, double key, uint32_t number, uint32_t by, vsh_error *error) {
+    VSHI_TRY(vshi_make_room((void **)&heap->entries, heap->count, &heap->capacity, sizeof *heap->entries,
+                            what, error));
+    const vshi_heap_entry entry = {key, number, by};
+    size_t at = heap->count++;
+    for (size_t above; at > 0 && comes_before(&entry, &heap->entries[above = (at - 1) / 2]); at = above) {
+        heap->entries[at] = heap->entries[above];
+    }
+    heap->entries[at] = entry;
+    return VSH_OK;
+}
+
+vshi_heap_entry vshi_heap_pop(vshi_heap *heap) {
+    const vshi_heap_entry least = heap->entries[0], last = heap->entries[--heap->count];
+    size_t at = 0;
+    for (size_t below; (below = 2 * at + 1) < heap->count; at = below) {
+        if (below + 1 < heap->count && comes_before(&heap->entries[below + 1], &heap->entries[below])) {
+            ++below;
+        }
+        if (!comes_before(&heap->entries[below], &last)) {
+            break;
+        }
+        heap->entries[at] = heap->entries[below];
+    }
+    heap->entries[at] = last;
+    return least;
+}
+
+/* --- growing */
+
 /* Cosine of the angle between a unit's normal and its chart's: a spherical cap of 60° has an L2 stretch
  * of 1.05 once it is flat. */
 static const double WIDEST = 0.5;
 
-/* Weights of a unit's cost, by which charts grow. NORMAL: the normals' difference, 0 … 0.5. STRAIGHT: the
- * share of the unit's border that the chart's border would gain, less the share that it would lose, -1 … 1.
- * SEAM: the share of seams of normals and UVs in the border that it would lose, 0 … 1. FAR: the distance from
- * the chart's middle, in radii of a chart of mean area. */
+/* Weights of a unit's cost, by which charts grow. NORMAL: the difference of normals, 0 … 0.5. STRAIGHT: the
+ * share of the unit's border that the chart's border gains, less the share that it loses, -1 … 1. SEAM: the
+ * share of seams (normals, UVs) in the lost border, 0 … 1. FAR: the distance from the chart's middle, in
+ * radii of a chart of mean area. */
 static const double NORMAL = 2.0, STRAIGHT = 1.0, SEAM = 2.0, FAR = 0.5;
 
 enum {
     NORMAL_SMOOTHINGS = 2,
     ROUNDS = 3, /* of growing all charts again */
     BORDER_SMOOTHINGS = 8,
-    MOST_SIDES = 48, /* of a unit that count for straightness */
-    CHUNK = 4096     /* units between two looks at whether to stop */
+    MOST_SIDES = 48, /* a unit's first sides that count for straightness */
+    CHUNK = 4096     /* units between checks for cancellation */
 };
 
 typedef struct unit {
-    vshi_vec normal; /* unit, of the unit and what is around it: noise of a scan stays out */
+    vshi_vec normal; /* smoothed over neighbours, against noise of scans */
     vshi_vec centre;
     double area;
     uint32_t number;
@@ -41,7 +79,7 @@ typedef struct chart {
     vshi_vec axis;   /* unit */
     vshi_vec sum;    /* of normals, by area */
     vshi_vec middle; /* where growth began */
-    vshi_vec centre; /* by area, of what it has */
+    vshi_vec centre; /* by area, of its units */
     double area;
     uint32_t seed;
 } chart;
@@ -50,16 +88,16 @@ typedef struct growing {
     const vshi_cut_mesh *surface;
     vshi_job *job;
     uint32_t count;
-    unit *units;     /* [count] */
+    unit *units;     /* [count]; one block with the arrays below */
     uint32_t *begin; /* [count + 1] in `sides` */
-    uint32_t *sides; /* that lead to another unit, by unit */
+    uint32_t *sides; /* between units, by unit */
     unit *by_area;   /* [count]: the units, the largest first */
     uint32_t *owner; /* [count]: each unit's chart */
     chart *charts;   /* [count]: as many as there may be */
     uint32_t chart_count;
     vshi_heap heap;
-    double radius; /* of a chart of mean area */
-    uint32_t taken;
+    double radius;  /* a chart of mean area has this radius */
+    uint32_t added; /* units */
 } growing;
 
 /* --- units */
@@ -130,7 +168,7 @@ static vsh_result smooth_normals(growing *w, vsh_error *error) {
             vshi_vec sum = vshi_scale(before[u], w->units[u].area);
             for (uint32_t i = w->begin[u]; i < w->begin[u + 1]; ++i) {
                 const uint32_t other = unit_beyond(w, i);
-                /* a large unit beside a small one tells no more than its surroundings would */
+                /* a large unit counts no more than as many small ones */
                 sum = vshi_add(sum, vshi_scale(before[other], fmin(w->units[other].area, w->units[u].area)));
             }
             const vshi_vec normal = vshi_unit(sum);
@@ -145,22 +183,23 @@ static vsh_result smooth_normals(growing *w, vsh_error *error) {
 
 /* --- charts */
 
-static double cost(const growing *w, uint32_t number, uint32_t by) {
+/* The cost for a chart to grow by a unit. */
+static double find_cost(const growing *w, uint32_t number, uint32_t by) {
     const unit *u = &w->units[number];
     const chart *c = &w->charts[by];
-    double shared = 0.0, seam = 0.0, looked = 0.0;
+    double shared = 0.0, seam = 0.0, border = 0.0;
     const uint32_t begin = w->begin[number];
     uint32_t end = w->begin[number + 1];
     end = end > begin + MOST_SIDES ? begin + MOST_SIDES : end;
     for (uint32_t i = begin; i < end; ++i) {
         const double length = vshi_side_length(w->surface, w->sides[i]);
-        looked += length;
+        border += length;
         if (w->owner[unit_beyond(w, i)] == by) {
             shared += length;
             seam += w->surface->soft[w->sides[i]] ? 0.0 : length;
         }
     }
-    const double straight = looked > 0.0 ? (looked - 2.0 * shared) / looked : 0.0;
+    const double straight = border > 0.0 ? (border - 2.0 * shared) / border : 0.0;
     const double far = vshi_length(vshi_sub(u->centre, c->middle)) / w->radius;
     return NORMAL * (1.0 - vshi_dot(u->normal, c->axis)) + STRAIGHT * straight +
            (shared > 0.0 ? SEAM * seam / shared : 0.0) + FAR * far;
@@ -170,13 +209,13 @@ static vsh_result push_around(growing *w, uint32_t number, uint32_t by, vsh_erro
     for (uint32_t i = w->begin[number]; i < w->begin[number + 1]; ++i) {
         const uint32_t other = unit_beyond(w, i);
         if (w->owner[other] == VSHI_NONE && vshi_dot(w->units[other].normal, w->charts[by].axis) > WIDEST) {
-            VSHI_TRY(vshi_heap_push(&w->heap, cost(w, other, by), other, by, error));
+            VSHI_TRY(vshi_heap_push(&w->heap, find_cost(w, other, by), other, by, error));
         }
     }
     return VSH_OK;
 }
 
-static void take(growing *w, uint32_t number, uint32_t by) {
+static void add_to_chart(growing *w, uint32_t number, uint32_t by) {
     const unit *u = &w->units[number];
     chart *c = &w->charts[by];
     w->owner[number] = by;
@@ -185,7 +224,7 @@ static void take(growing *w, uint32_t number, uint32_t by) {
     c->area += u->area;
 }
 
-/* Grows what is in the heap until nothing fits. Axes follow what charts have where `follow`. */
+/* Grows charts by the units in the heap until none fits. With `follow`, axes follow the units of a chart. */
 static vsh_result grow(growing *w, bool follow, vsh_error *error) {
     while (w->heap.count > 0) {
         const vshi_heap_entry next = vshi_heap_pop(&w->heap);
@@ -196,26 +235,26 @@ static vsh_result grow(growing *w, bool follow, vsh_error *error) {
         if (follow && vshi_dot(w->units[next.what].normal, c->axis) <= WIDEST) {
             continue;
         }
-        take(w, next.what, next.by);
+        add_to_chart(w, next.what, next.by);
         if (follow) {
             c->axis = vshi_unit(c->sum);
         }
         VSHI_TRY(push_around(w, next.what, next.by, error));
-        if (++w->taken % CHUNK == 0 && vshi_job_advance(w->job, 0)) {
+        if (++w->added % CHUNK == 0 && vshi_job_advance(w->job, 0)) {
             return vshi_job_fail_cancelled(w->job, error);
         }
     }
     return VSH_OK;
 }
 
-/* Charts for what no chart has, one after the other, from the largest unit on. */
+/* Makes charts of units without one, one after the other, from the largest unit on. */
 static vsh_result grow_rest(growing *w, vsh_error *error) {
     for (uint32_t i = 0; i < w->count; ++i) {
         const uint32_t seed = w->by_area[i].number, by = w->chart_count;
         if (w->owner[seed] == VSHI_NONE) {
             w->charts[w->chart_count++] =
                 (chart){.axis = w->units[seed].normal, .middle = w->units[seed].centre, .seed = seed};
-            take(w, seed, by);
+            add_to_chart(w, seed, by);
             VSHI_TRY(push_around(w, seed, by, error));
             VSHI_TRY(grow(w, true, error));
         }
@@ -223,7 +262,7 @@ static vsh_result grow_rest(growing *w, vsh_error *error) {
     return VSH_OK;
 }
 
-/* The unit in the middle of each chart, that is like it: the next seeds. */
+/* The next seeds: a unit near each chart's middle whose normal is near the chart's. */
 static void find_seeds(growing *w) {
     double total = 0.0;
     for (uint32_t c = 0; c < w->chart_count; ++c) {
@@ -241,7 +280,7 @@ static void find_seeds(growing *w) {
                            0.3 * vshi_length(vshi_sub(own->centre, one->middle)) / w->radius;
         if (one->seed == VSHI_NONE || far < one->sum.x) {
             one->seed = u;
-            one->sum.x = far; /* the least so far: the sum is not needed any more */
+            one->sum.x = far; /* reused for the least so far */
         }
     }
 }
@@ -253,7 +292,7 @@ static vsh_result grow_again(growing *w, vsh_error *error) {
         chart *one = &w->charts[c];
         one->sum = one->centre = (vshi_vec){0, 0, 0};
         one->area = 0.0;
-        take(w, one->seed, c);
+        add_to_chart(w, one->seed, c);
     }
     for (uint32_t c = 0; c < w->chart_count; ++c) {
         VSHI_TRY(push_around(w, w->charts[c].seed, c, error));
@@ -262,8 +301,8 @@ static vsh_result grow_again(growing *w, vsh_error *error) {
     return grow_rest(w, error);
 }
 
-/* Moves teeth of borders to the chart around them: units that hang on their own chart by one other unit, and
- * share more of their border with another. No chart falls apart by that. */
+/* Moves the teeth of borders to the chart around them. A tooth is a unit connected to its own chart by one
+ * unit, that shares more of its border with another chart; its own chart stays connected. */
 static uint32_t move_teeth(growing *w) {
     uint32_t moved = 0;
     for (uint32_t u = 0; u < w->count; ++u) {
@@ -304,7 +343,7 @@ vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_
                                  VSHI_ARRAY(w.owner, w.count),
                                  VSHI_ARRAY(w.charts, w.count)};
     vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     measure_units(&w);
     list_sides(&w);
     VSHI_TRY_DONE(smooth_normals(&w, error));
@@ -323,11 +362,6 @@ vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_
     *chart_count = w.chart_count;
 done:
     free(w.heap.entries);
-    free(w.charts);
-    free(w.owner);
-    free(w.by_area);
-    free(w.sides);
-    free(w.begin);
     free(w.units);
     return result;
 }

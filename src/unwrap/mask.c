@@ -1,5 +1,5 @@
-/* Borders are drawn, and what lies between them is filled, however many triangles that are. */
-#include "unwrap/mask.h"
+/* Which texels a chart touches. Its borders are drawn and filled, so triangles inside cost nothing. */
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
 
@@ -7,17 +7,15 @@
 
 static const char what[] = "texels of a chart";
 
-static const double BOX = 0.9;      /* share of its box that a chart fills at least to be fitted to texels */
-static const double MOST_FIT = 1.3; /* factor by which that may change a side */
-/* Texels by which the borders of such a chart lie beyond the centres of its outermost texels: rays that began
- * on the very border would begin on what stands there. */
+static const double BOX = 0.9;      /* least share of its box that a chart fills to be fitted to texels */
+static const double MOST_FIT = 1.3; /* factor by which fitting may change a side */
+/* Texels from the centres of such a chart's outermost texels to its borders: rays that began right at a
+ * border would hit what stands there. */
 static const double BEYOND = 0.1;
-static const double SLACK = 1e-9; /* texels: a border that is so near to a texel's is on it */
+static const double SLACK = 1e-9; /* texels: rounding of a border's place */
 
-enum { FARTHEST = 1 << 24 }; /* texels: no page is so large */
-
-static const double ROOM =
-    1e-4; /* texels: what is so near to a texel's border is on it; 32-bit UVs know no better */
+enum { FARTHEST = 1 << 24 };     /* texels: larger than any page */
+static const double ROOM = 1e-4; /* texels: rounding of 32-bit UVs */
 
 /* --- bits */
 
@@ -41,7 +39,7 @@ int32_t vshi_bits_next(const uint64_t *row, int32_t x, int32_t width, bool value
     return width;
 }
 
-/* Fills a mask by its bits, of `words` to a row. */
+/* Fills a mask from its bits, `words` to a row. */
 static vsh_result list_runs(const uint64_t *bits, size_t words, vshi_mask *mask, vsh_error *error) {
     VSHI_TRY(vshi_allocate((void **)&mask->row, (size_t)mask->height + 1, sizeof *mask->row, what, error));
     for (int pass = 0; pass < 2; ++pass) {
@@ -106,7 +104,7 @@ static void rows_of(const double at[3][2], int32_t height, int32_t *first, int32
     *last = *last > *first ? *last : *first;
 }
 
-/* The ends of a side, as a triangle without area: what it touches is told as of one. */
+/* The ends of a side, as a triangle without area. */
 static void place_side(const vshi_patch *p, const vshi_fit *fit, uint32_t side, double at[3][2]) {
     for (int k = 0; k < 2; ++k) {
         const double *uv = p->uv[p->corner[side / 3][(side + (uint32_t)k) % 3]];
@@ -118,8 +116,7 @@ static void place_side(const vshi_patch *p, const vshi_fit *fit, uint32_t side, 
     at[2][1] = at[1][1];
 }
 
-/* Marks where a side crosses the middle lines of rows, from one end's row on to before the other's: what lies
- * between two marks of a row is within the patch. */
+/* Marks where a side crosses the middle lines of rows. The patch lies between pairs of marks of a row. */
 static void mark_crossings(const double at[3][2], const vshi_mask *mask, size_t words, uint64_t *marks) {
     const double *low = at[0][1] < at[1][1] ? at[0] : at[1], *high = at[0][1] < at[1][1] ? at[1] : at[0];
     const int32_t first = clamp(ceil(low[1] - 0.5), mask->height),
@@ -153,10 +150,9 @@ static void draw_borders(const vshi_patch *p, const vshi_fit *fit, const vshi_ma
 vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
     *mask = (vshi_mask){.width = fit->width, .height = fit->height};
     const size_t words = (size_t)mask->width / 64 + 1, count = words * (size_t)mask->height;
-    uint64_t *bits = NULL, *marks = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&bits, count, sizeof *bits, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&marks, count, sizeof *marks, what, error));
+    uint64_t *bits, *marks;
+    const vshi_array arrays[] = {VSHI_ARRAY(bits, count), VSHI_ARRAY(marks, count)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     draw_borders(p, fit, mask, words, bits, marks);
     for (size_t i = 0, within = 0; i < count; ++i) { /* an even number of marks ends each row outside */
         uint64_t inside = marks[i];
@@ -167,9 +163,7 @@ vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *m
         within = inside >> 63;
         bits[i] |= inside;
     }
-    result = list_runs(bits, words, mask, error);
-done:
-    free(marks);
+    const vsh_result result = list_runs(bits, words, mask, error);
     free(bits);
     return result;
 }
@@ -182,8 +176,8 @@ void vshi_mask_free(vshi_mask *mask) {
 
 /* --- quarter turns */
 
-/* Anticlockwise, (x, y) goes to (height - 1 - y, x); clockwise to (y, width - 1 - x): rows or columns are
- * turned back, and exchanged. Half a turn turns both back. */
+/* Anticlockwise, (x, y) moves to (height - 1 - y, x); clockwise to (y, width - 1 - x); by half a turn to
+ * (width - 1 - x, height - 1 - y). */
 vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *to, vsh_error *error) {
     const bool exchanged = quarters != 2;
     *to = (vshi_mask){.width = exchanged ? mask->height : mask->width,
@@ -219,7 +213,17 @@ void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double
     at[1] = turned[quarters][1];
 }
 
-/* --- the least box around a chart: one of its sides runs along the convex hull (Freeman and Shapira,
+/* Cosines and sines of the angles. */
+static const double TURNS[VSHI_ANGLES][2] = {{1.0, 0.0},
+                                             {0.98078528040323043, 0.19509032201612828},
+                                             {0.92387953251128676, 0.38268343236508977},
+                                             {0.83146961230254524, 0.55557023301960218},
+                                             {0.70710678118654752, 0.70710678118654752},
+                                             {0.55557023301960218, 0.83146961230254524},
+                                             {0.38268343236508977, 0.92387953251128676},
+                                             {0.19509032201612828, 0.98078528040323043}};
+
+/* --- the smallest box around a chart: one of its sides runs along the convex hull (Freeman and Shapira,
  * "Determining the minimum-area encasing rectangle for an arbitrary closed curve", 1975) */
 
 typedef struct point {
@@ -259,7 +263,7 @@ static double dot_along(point p, double x, double y) {
     return p.x * x + p.y * y;
 }
 
-/* Direction of the least box's lower side. */
+/* Direction of the smallest box's lower side. */
 static point find_direction(const point *hull, size_t count) {
     point best = {1.0, 0.0};
     double least = INFINITY;
@@ -278,8 +282,7 @@ static point find_direction(const point *hull, size_t count) {
             top = up > top ? up : top;
         }
         const double width = high - low, height = top - dot_along(a, -y, x);
-        if (width * height <
-            least * 0.9999) { /* of boxes that are alike, the first: rounding tells nothing */
+        if (width * height < least * 0.9999) { /* the first of equal boxes, whatever the rounding */
             least = width * height;
             best = (point){x, y};
         }
@@ -287,70 +290,42 @@ static point find_direction(const point *hull, size_t count) {
     return best;
 }
 
-static void turn(vshi_patch *p, point along, double size[2]) {
+/* Turns uv so that `along` is u, and moves their box to 0. Returns whether it is higher than wide. */
+static bool turn(vshi_patch *p, point along) {
     double low[2], high[2];
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         const point at = {p->uv[v][0], p->uv[v][1]};
         p->uv[v][0] = dot_along(at, along.x, along.y);
         p->uv[v][1] = dot_along(at, -along.y, along.x);
     }
-    vshi_patch_box(p, low, high);
+    vshi_patch_box(p, TURNS[0], low, high);
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         p->uv[v][0] -= low[0];
         p->uv[v][1] -= low[1];
     }
-    size[0] = high[0] - low[0];
-    size[1] = high[1] - low[1];
+    return high[1] - low[1] > high[0] - low[0];
 }
 
-/* Cosines and sines of the angles. */
-static const double TURNS[VSHI_ANGLES][2] = {{1.0, 0.0},
-                                             {0.98078528040323043, 0.19509032201612828},
-                                             {0.92387953251128676, 0.38268343236508977},
-                                             {0.83146961230254524, 0.55557023301960218},
-                                             {0.70710678118654752, 0.70710678118654752},
-                                             {0.55557023301960218, 0.83146961230254524},
-                                             {0.38268343236508977, 0.92387953251128676},
-                                             {0.19509032201612828, 0.98078528040323043}};
-
-static void measure_boxes(const vshi_patch *p, vshi_boxes *boxes) {
-    for (int a = 0; a < VSHI_ANGLES; ++a) {
-        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
-        for (uint32_t v = 0; v < p->vertex_count; ++v) {
-            const double *uv = p->uv[v];
-            const double at[2] = {TURNS[a][0] * uv[0] - TURNS[a][1] * uv[1],
-                                  TURNS[a][1] * uv[0] + TURNS[a][0] * uv[1]};
-            for (int k = 0; k < 2; ++k) {
-                low[k] = at[k] < low[k] ? at[k] : low[k];
-                high[k] = at[k] > high[k] ? at[k] : high[k];
-            }
-        }
-        for (int k = 0; k < 2; ++k) {
-            boxes->low[a][k] = low[k];
-            boxes->size[a][k] = high[k] - low[k];
-        }
-    }
-}
-
-vsh_result vshi_patch_straighten(vshi_patch *p, vshi_boxes *boxes, vsh_error *error) {
-    point *points = NULL, *hull = NULL;
-    double size[2];
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&points, p->vertex_count, sizeof *points, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&hull, 2 * (size_t)p->vertex_count + 2, sizeof *hull, what, error));
+vsh_result vshi_patch_straighten(vshi_patch *p, vsh_error *error) {
+    point *points, *hull;
+    const vshi_array arrays[] = {VSHI_ARRAY(points, p->vertex_count),
+                                 VSHI_ARRAY(hull, 2 * (size_t)p->vertex_count + 2)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         points[v] = (point){p->uv[v][0], p->uv[v][1]};
     }
     qsort(points, p->vertex_count, sizeof *points, compare_points);
-    turn(p, find_direction(hull, find_hull(points, p->vertex_count, hull)), size);
-    if (size[1] > size[0]) {
-        turn(p, (point){0.0, 1.0}, size);
+    if (turn(p, find_direction(hull, find_hull(points, p->vertex_count, hull)))) {
+        turn(p, (point){0.0, 1.0});
     }
-    measure_boxes(p, boxes);
-done:
-    free(hull);
+    for (int a = 0; a < VSHI_ANGLES; ++a) {
+        double high[2];
+        vshi_patch_box(p, TURNS[a], p->low[a], high);
+        p->size[a][0] = high[0] - p->low[a][0];
+        p->size[a][1] = high[1] - p->low[a][1];
+    }
     free(points);
-    return result;
+    return VSH_OK;
 }
 
 /* --- fits to texels */
@@ -359,30 +334,29 @@ static int32_t whole(double x) {
     return x < 1.0 ? 1 : x > FARTHEST ? FARTHEST : (int32_t)x;
 }
 
-bool vshi_patch_is_box(const vshi_patch *p, const vshi_boxes *boxes) {
-    return p->area > BOX * boxes->size[0][0] * boxes->size[0][1];
+bool vshi_patch_is_box(const vshi_patch *p) {
+    return p->area > BOX * p->size[0][0] * p->size[0][1];
 }
 
-vshi_fit vshi_mask_fit(const vshi_patch *p, const vshi_boxes *boxes, int angle, double density,
-                       double max_stretch) {
+vshi_fit vshi_mask_fit(const vshi_patch *p, int angle, double density, double max_stretch) {
     vshi_fit fit = {.uneven = 1.0};
     double factor[2];
     int32_t texels[2];
-    bool fits = angle == 0 && !p->kept && vshi_patch_is_box(p, boxes);
+    bool fits = angle == 0 && !p->kept && vshi_patch_is_box(p);
     for (int k = 0; k < 2; ++k) {
-        const double length = boxes->size[angle][k] * density;
+        const double length = p->size[angle][k] * density;
         texels[k] = whole(floor(length + 0.5));
         factor[k] = (texels[k] + 2.0 * BEYOND) / length;
         fits = fits && factor[k] < MOST_FIT && factor[k] > 1.0 / MOST_FIT;
     }
-    const double uneven = factor[0] / factor[1]; /* isometric but for this it stretches by the root of … */
+    const double uneven = factor[0] / factor[1];
     fits = fits && p->stretch * sqrt(0.5 * (uneven + 1.0 / uneven)) < max_stretch;
     fit.uneven = fits ? uneven : 1.0;
     int32_t *sides[2] = {&fit.width, &fit.height};
     for (int k = 0; k < 2; ++k) {
-        const double length = boxes->size[angle][k] * density, scale = fits ? density * factor[k] : density;
+        const double length = p->size[angle][k] * density, scale = fits ? density * factor[k] : density;
         *sides[k] = fits ? texels[k] + 1 : whole(ceil(length - SLACK));
-        fit.offset[k] = (fits ? 0.5 - BEYOND : 0.5 * (*sides[k] - length)) - scale * boxes->low[angle][k];
+        fit.offset[k] = (fits ? 0.5 - BEYOND : 0.5 * (*sides[k] - length)) - scale * p->low[angle][k];
         fit.matrix[k][0] = scale * TURNS[angle][k];
         fit.matrix[k][1] = scale * (k == 0 ? -TURNS[angle][1] : TURNS[angle][0]);
     }

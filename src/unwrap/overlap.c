@@ -1,8 +1,9 @@
-/* Three looks, as none sees everything. Holes that are turned inside out are found by how they run; borders
- * that cross are found by a sweep along u: where no triangle flips, a chart that lies over itself has such
- * borders, unless they meet only in corners and along each other, as those of regular grids do. A
- * raster, about as fine as the triangles, sees these: each of its points is of one triangle at most. */
-#include "unwrap/patch.h"
+/* Whether a flat chart lies over itself. Three tests, as none finds everything. A hole that is turned inside
+ * out runs the wrong way. Borders that cross are found by a sweep along u: a chart without flipped triangles
+ * that overlaps has such borders, unless they meet only in corners and along each other, as on regular grids.
+ * A raster, about as fine as the triangles, finds the latter: each of its points lies in one triangle at
+ * most. */
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
 
@@ -10,12 +11,11 @@
 
 static const char what[] = "looking for overlap";
 
-static const double TOUCH = 1e-7; /* of the chart's size: borders that are so near touch */
-static const double OFFSET =
-    0.371; /* of a point of the raster: so that none lies on lines that charts are drawn on */
+static const double TOUCH = 1e-7;   /* of the chart's size: closer borders touch */
+static const double OFFSET = 0.371; /* of the raster's points: off the lines that charts are modelled on */
 
-/* Pairs of sides, about a minute: only UVs of slivers that cross the whole square have more. */
-static const uint64_t MOST_LOOKS = UINT64_C(1) << 36;
+/* Pairs of sides to compare, about a minute: only slivers across the whole square make more. */
+static const uint64_t MOST_PAIRS = UINT64_C(1) << 36;
 
 enum { LEAST_SIDE = 64, MOST_SIDE = 2048, POINTS = 8 /* of the raster to a triangle */ };
 
@@ -25,15 +25,15 @@ typedef struct frame {
 
 /* --- the raster */
 
-/* Where the edge crosses a row; the same for both triangles beside it. */
+/* Where an edge crosses a row; the same for both triangles beside it. */
 static double cross_row(const double *a, const double *b, double y) {
     const double *low = a[1] < b[1] ? a : b, *high = a[1] < b[1] ? b : a;
     return low[0] + (high[0] - low[0]) * ((y - low[1]) / (high[1] - low[1]));
 }
 
-/* Marks the points in a triangle; false where one is marked already. A point is in where edges to its left
- * and below are at most as far as it. */
-static bool mark(uint64_t *marked, size_t side, const double at[3][2]) {
+/* Marks the points in a triangle; false if one is marked already. Points on a left or lower edge are inside.
+ */
+static bool mark_points(uint64_t *marked, size_t side, const double at[3][2]) {
     double least = at[0][1], most = at[0][1];
     for (int k = 1; k < 3; ++k) {
         least = at[k][1] < least ? at[k][1] : least;
@@ -78,7 +78,7 @@ static vsh_result raster_overlaps(const vshi_patch *p, const frame *f, bool *ove
                 at[k][d] = (uv[d] - f->low[d]) * scale + OFFSET;
             }
         }
-        *overlaps = !mark(marked, side, at);
+        *overlaps = !mark_points(marked, side, at);
     }
     free(marked);
     return VSH_OK;
@@ -99,13 +99,13 @@ typedef struct borders {
     uint32_t count;
 } borders;
 
-static void ends_of(const borders *b, uint32_t i, const double *end[2]) {
+static void find_ends(const borders *b, uint32_t i, const double *end[2]) {
     const uint32_t side = b->sides[i].side;
     end[0] = b->patch->uv[b->patch->corner[side / 3][side % 3]];
     end[1] = b->patch->uv[b->patch->corner[side / 3][(side + 1) % 3]];
 }
 
-/* How far c is to the left of the line from a to b. */
+/* Distance of c to the left of the line from a to b. */
 static double left_of(const double *a, const double *b, const double *c) {
     const double x = b[0] - a[0], y = b[1] - a[1], length = sqrt(x * x + y * y);
     return length > 0.0 ? (x * (c[1] - a[1]) - y * (c[0] - a[0])) / length : 0.0;
@@ -117,14 +117,14 @@ static bool parted(double a, double b, double least) {
 
 static bool crosses(const borders *b, uint32_t i, uint32_t k) {
     const double *a[2], *c[2], least = TOUCH * b->frame.size;
-    ends_of(b, i, a);
-    ends_of(b, k, c);
+    find_ends(b, i, a);
+    find_ends(b, k, c);
     return parted(left_of(a[0], a[1], c[0]), left_of(a[0], a[1], c[1]), least) &&
            parted(left_of(c[0], c[1], a[0]), left_of(c[0], c[1], a[1]), least);
 }
 
-/* Holes run clockwise, as what they bound is outside of them. One that runs the other way has been turned
- * inside out, and lies over what is around it without a border that crosses another. */
+/* Holes run clockwise. A hole that runs anticlockwise has been turned inside out, and lies over its
+ * surroundings without crossing another border. */
 static vsh_result holes_overlap(const borders *b, bool *overlaps, vsh_error *error) {
     const vshi_patch *p = b->patch;
     uint32_t *out = NULL, found = 0; /* [vertex_count]: the side of the border that leaves a vertex, + 1 */
@@ -159,7 +159,7 @@ static bool any_crosses(borders *b) {
     if (b->count > 0) {
         qsort(b->sides, b->count, sizeof *b->sides, compare_sides);
     }
-    uint64_t looked = 0;
+    uint64_t pairs = 0;
     for (uint32_t i = 0; i < b->count; ++i) {
         const border_side *one = &b->sides[i];
         uint32_t k = i + 1;
@@ -169,8 +169,8 @@ static bool any_crosses(borders *b) {
                 return true;
             }
         }
-        looked += k - i;
-        if (looked > MOST_LOOKS) {
+        pairs += k - i;
+        if (pairs > MOST_PAIRS) {
             return true;
         }
     }
@@ -189,7 +189,7 @@ static vsh_result borders_overlap(const vshi_patch *p, const frame *f, bool *ove
         if (p->beyond[side] == VSHI_NONE) {
             const double *end[2];
             b.sides[b.count].side = side;
-            ends_of(&b, b.count, end);
+            find_ends(&b, b.count, end);
             for (int d = 0; d < 2; ++d) {
                 b.sides[b.count].low[d] = fmin(end[0][d], end[1][d]);
                 b.sides[b.count].high[d] = fmax(end[0][d], end[1][d]);
@@ -209,7 +209,7 @@ vsh_result vshi_patch_overlaps(const vshi_patch *p, bool *overlaps, vsh_error *e
     *overlaps = false;
     frame f;
     double high[2];
-    vshi_patch_box(p, f.low, high);
+    vshi_patch_box(p, (const double[2]){1.0, 0.0}, f.low, high);
     f.size = high[0] - f.low[0] > high[1] - f.low[1] ? high[0] - f.low[0] : high[1] - f.low[1];
     if (!(f.size > 0.0) || !isfinite(f.size)) {
         return VSH_OK;

@@ -1,8 +1,8 @@
-/* The density at which charts just fit is found by attempts: the first from their areas and borders, then up
- * or down by steps until one fits and the next does not, then between the two. */
-#include "unwrap/pack.h"
+/* Charts packed into pages. The density at which they just fit is found by attempts: first a guess from their
+ * areas and borders, then steps up or down until one fits and the next does not, then densities between. */
+#include "unwrap/charts.h"
 
-#include "base/hash.h"
+#include "base/bytes.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 
@@ -10,19 +10,19 @@
 
 static const char what[] = "packing charts";
 
-/* --- Bottom-left: the largest first, each where its upper end lies lowest, over the turns that make a
- * difference. Meshes stay whole: a page takes those that its area has room for, and gives up one after the
- * other until the rest fit. */
+/* --- Bottom-left: the largest chart first, each where its upper end is lowest, over all turns that differ.
+ * Meshes stay whole: a page gets as many as its area has room for, and drops one after the other until the
+ * rest fit. */
 
-/* A page of an atlas: which texels are taken. */
+/* Which texels of a page are taken. */
 typedef struct atlas_page {
     int32_t width, height, padding;
     size_t words;      /* of a row */
-    uint64_t *taken;   /* [height][words]: texels that no other chart may touch; those past the width are */
+    uint64_t *taken;   /* [height][words]: texels that no other chart may touch; set past the width */
     int32_t *free_run; /* [height]: longest run of free texels */
     int32_t used;      /* rows up to the last that a chart touches */
-    int32_t patience;  /* rows that a search looks at closely before it begins to leave some out; 0: all */
-    uint64_t *forbidden, *grown; /* [words + 1]: room of the search */
+    int32_t patience;  /* rows that a search tries before it begins to skip some; 0: all */
+    uint64_t *forbidden, *grown; /* [words + 1]: scratch of the search */
 } atlas_page;
 
 /* Which chart comes first. */
@@ -31,34 +31,35 @@ enum { BY_SIDES = 0, BY_AREA = 1, BY_LONGEST = 2, ORDERS = 3 };
 typedef struct placing {
     const vshi_packing *packing;
     vshi_job *job;
-    vshi_item *items; /* [count] */
+    vshi_pack_item *items; /* [count] */
     size_t count;
     double density;
-    int angle_step;                /* 1 or 2: which of the angles are tried */
-    int32_t least_turned;          /* texels: shorter charts are turned by quarters alone */
-    vshi_mask **masks;             /* [count][angles × VSHI_QUARTERS]; runs are NULL of turns not yet made */
-    int *angles;                   /* [count]: how many are tried of each */
+    int angle_step;       /* 1 or 2: every angle is tried, or every second */
+    int32_t least_turned; /* texels: shorter charts are turned by quarters only */
+    vshi_mask **masks;    /* [count][angles × VSHI_QUARTERS]; runs are NULL for turns not yet made; one
+                             block with all arrays, those of the page too */
+    int *angles;          /* [count]: how many are tried of each */
     vshi_fit (*fits)[VSHI_ANGLES]; /* [count] */
-    uint32_t *order;               /* [count]: items, the first first */
+    uint32_t *order;               /* [count]: items in the order in which they are placed */
     atlas_page page;
     int32_t *hints; /* row where the last chart of a size was placed */
 } placing;
 
-enum { LEAST_TURNED = 40 };               /* texels: shorter charts are turned by quarters alone */
+enum { LEAST_TURNED = 40 };               /* texels, for `least_turned` */
 enum { IMPATIENT = 3000, PATIENCE = 24 }; /* charts; rows */
-enum { THOROUGH = 64 };                   /* charts that are tried at every angle, others at every second */
-enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and look for a place from the first row on */
+enum { THOROUGH = 64 };                   /* most charts for which every angle is tried */
+enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and search from the first row on */
 
 /* Share of a page's texels that padded charts may have for it to be tried. */
 static const double HOPE = 0.95;
 
-/* --- pages. All columns of a row are asked at once: bit x of `forbidden` says that the mask meets a taken
- * texel if it stands at x. A run of n texels from b on is in the way of x where any of the n texels from x +
- * b on is taken, which is the row's bits or-ed over n shifts, by doubling. */
+/* --- pages. All columns of a row are tested at once: bit x of `forbidden` says that a mask at x meets a
+ * taken texel. A run of n texels from b on forbids x if any of the n texels from x + b on is taken. Those
+ * bits are the row's bits or-ed over n shifts, by doubling. */
 
 enum {
     NEEDS = 16,
-    STEP = 96 /* rows of a chart for which it may miss a row that it would fit in */
+    STEP = 96 /* rows of a chart for each row that its search skips */
 };
 
 static void page_clear(atlas_page *page) {
@@ -72,7 +73,7 @@ static void page_clear(atlas_page *page) {
     page->used = 0;
 }
 
-/* to = from moved `shift` places down; both have a word behind, and what comes from beyond it is taken. */
+/* to |= from moved down by `shift` bits. Both have one more word; bits beyond it count as taken. */
 static void or_shifted(uint64_t *to, const uint64_t *from, size_t words, uint32_t shift) {
     const size_t skip = shift / 64;
     const uint32_t bits = shift % 64;
@@ -131,8 +132,8 @@ static int32_t longest_run(const vshi_mask *mask, int32_t row) {
 typedef struct needs {
     int32_t row[NEEDS], length[NEEDS];
     int32_t count;
-    int32_t least; /* that every row needs */
-    bool boxy;     /* which is nearly what the longest needs */
+    int32_t least; /* free run that every row needs */
+    bool boxy;     /* `least` is nearly the most */
 } needs;
 
 static needs needs_of(const vshi_mask *mask) {
@@ -159,9 +160,9 @@ static bool may_fit(const atlas_page *page, const needs *n, int32_t y) {
     return true;
 }
 
-/* The first row, y or above, at which each row of the mask may find a free run that is long enough. */
-static int32_t next_row(const atlas_page *page, const vshi_mask *mask, const needs *n, int32_t y,
-                        int32_t limit) {
+/* The first row from y on at which each row of the mask may find a free run that is long enough. */
+static int32_t find_next_row(const atlas_page *page, const vshi_mask *mask, const needs *n, int32_t y,
+                             int32_t limit) {
     while (y + mask->height <= limit) {
         int32_t r = n->boxy ? mask->height - 1 : -1;
         while (r >= 0 && page->free_run[y + r] >= n->least) {
@@ -182,10 +183,10 @@ static bool forbid_row(atlas_page *page, const vshi_mask *mask, int32_t y, int32
     return all_forbidden(page);
 }
 
-/* Whether the mask fits with its first row in row y, and the first column where it does. Rows far from each
- * other are asked first: they tell most. */
+/* Whether the mask fits with its first row in row y, and the first column for it. Rows far from each other
+ * come first: they decide most cases. */
 static bool fits_row(atlas_page *page, const vshi_mask *mask, int32_t y, int32_t *x) {
-    const int32_t last = page->width - mask->width; /* the last column that the mask may stand at */
+    const int32_t last = page->width - mask->width; /* the last column for the mask */
     for (size_t i = 0; i < page->words; ++i) {
         const int32_t allowed = last + 1 - (int32_t)(64 * i);
         page->forbidden[i] = allowed >= 64 ? 0 : allowed <= 0 ? ~(uint64_t)0 : ~(uint64_t)0 << allowed;
@@ -213,22 +214,23 @@ static bool fits_row(atlas_page *page, const vshi_mask *mask, int32_t y, int32_t
     return false;
 }
 
-/* The lowest place at or above `row`, and there the leftmost, at which a mask touches no taken texel and ends
- * at or below row `limit`; false where there is none. */
-static bool page_find(atlas_page *page, const vshi_mask *mask, int32_t row, int32_t limit, int32_t *x,
-                      int32_t *y) {
+/* The lowest place from `row` on, and there the leftmost, where a mask touches no taken texel and ends at row
+ * `limit` at most; false if there is none. */
+static bool find_place(atlas_page *page, const vshi_mask *mask, int32_t row, int32_t limit, int32_t *x,
+                       int32_t *y) {
     if (mask->width > page->width) {
         return false;
     }
     limit = limit < page->height ? limit : page->height;
     const needs n = needs_of(mask);
     int32_t step = 1 + mask->height / STEP, patience = page->patience;
-    for (int32_t at = row; (at = next_row(page, mask, &n, at, limit)) + mask->height <= limit; at += step) {
+    for (int32_t at = row; (at = find_next_row(page, mask, &n, at, limit)) + mask->height <= limit;
+         at += step) {
         if (fits_row(page, mask, at, x)) {
             *y = at;
             while (*y > row && at - *y < step && may_fit(page, &n, *y - 1) &&
                    fits_row(page, mask, *y - 1, x)) {
-                --*y; /* it has stepped over it */
+                --*y; /* a row that was skipped */
             }
             return true;
         }
@@ -251,8 +253,8 @@ static int32_t find_free_run(const atlas_page *page, int32_t y) {
     return longest;
 }
 
-/* Takes the mask's texels there, and those within the padding. */
-static void page_put(atlas_page *page, const vshi_mask *mask, int32_t x, int32_t y) {
+/* Marks the mask's texels and those within the padding as taken. */
+static void mark_taken(atlas_page *page, const vshi_mask *mask, int32_t x, int32_t y) {
     const int32_t low = y - page->padding > 0 ? y - page->padding : 0;
     const int32_t high = y + mask->height + page->padding;
     for (int32_t r = 0; r < mask->height; ++r) {
@@ -276,10 +278,10 @@ static void page_put(atlas_page *page, const vshi_mask *mask, int32_t x, int32_t
 
 /* --- one attempt */
 
-/* The page is `height` texels high, the packing's or more. Errors: VSH_ERROR_MEMORY. Free with
- * placing_free(), after a failure too. */
-static vsh_result placing_begin(const vshi_packing *packing, int32_t height, vshi_item *items, size_t count,
-                                vshi_job *job, placing *p, vsh_error *error) {
+/* The page is `height` texels high, at least the packing's. Free with placing_free(), after a failure too.
+ * Errors: VSH_ERROR_MEMORY. */
+static vsh_result placing_begin(const vshi_packing *packing, int32_t height, vshi_pack_item *items,
+                                size_t count, vshi_job *job, placing *p, vsh_error *error) {
     *p = (placing){
         .packing = packing, .job = job, .items = items, .count = count, .least_turned = LEAST_TURNED};
     p->angle_step = count > THOROUGH ? 2 : 1;
@@ -298,7 +300,7 @@ static vsh_result placing_begin(const vshi_packing *packing, int32_t height, vsh
                                  VSHI_ARRAY(page->free_run, (size_t)height),
                                  VSHI_ARRAY(page->forbidden, page->words + 1),
                                  VSHI_ARRAY(page->grown, page->words + 1)};
-    return VSHI_ALLOCATE_ALL(arrays, what, error);
+    return VSHI_ALLOCATE_BLOCK(arrays, what, error);
 }
 
 static void drop_masks(placing *p) {
@@ -313,33 +315,23 @@ static void drop_masks(placing *p) {
 
 static void placing_free(placing *p) {
     drop_masks(p);
-    free(p->page.grown);
-    free(p->page.forbidden);
-    free(p->page.free_run);
-    free(p->page.taken);
-    free(p->hints);
-    free(p->order);
-    free(p->fits);
-    free(p->angles);
     free(p->masks);
-    *p = (placing){0};
 }
 
 /* --- masks */
 
-/* A vshi_element_fn over items. Makes an item's masks, before quarter turns: those of angle number n are from
- * VSHI_QUARTERS n on. */
+/* A vshi_element_fn over items. Makes an item's masks, before quarter turns: the mask of angle n is number
+ * VSHI_QUARTERS n. */
 static vsh_result make_masks(void *user, size_t i, vsh_error *error) {
     placing *p = user;
-    const vshi_item *item = &p->items[i];
-    const bool plain = vshi_patch_is_box(item->patch, item->boxes) || p->fits[i][0].width < p->least_turned;
+    const vshi_pack_item *item = &p->items[i];
+    const bool plain = vshi_patch_is_box(item->patch) || p->fits[i][0].width < p->least_turned;
     p->angles[i] = plain ? 1 : VSHI_ANGLES / p->angle_step;
     VSHI_TRY(vshi_allocate((void **)&p->masks[i], (size_t)p->angles[i], VSHI_QUARTERS * sizeof(vshi_mask),
                            what, error));
     for (int n = 0; n < p->angles[i]; ++n) {
         const int a = n * p->angle_step;
-        p->fits[i][a] =
-            vshi_mask_fit(item->patch, item->boxes, a, p->density * item->factor, p->packing->max_stretch);
+        p->fits[i][a] = vshi_mask_fit(item->patch, a, p->density * item->factor, p->packing->max_stretch);
         VSHI_TRY(vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][VSHI_QUARTERS * n], error));
     }
     return VSH_OK;
@@ -362,8 +354,7 @@ static int compare_sort_keys(const void *a, const void *b) {
     return (x->item > y->item) - (x->item < y->item);
 }
 
-/* Sorts them. */
-static vsh_result placing_sort(placing *p, int by, vsh_error *error) {
+static vsh_result sort_items(placing *p, int by, vsh_error *error) {
     sort_key *keys = NULL;
     VSHI_TRY(vshi_allocate((void **)&keys, p->count, sizeof *keys, what, error));
     for (size_t i = 0; i < p->count; ++i) {
@@ -384,15 +375,14 @@ static vsh_result placing_sort(placing *p, int by, vsh_error *error) {
 
 /* Fits the items to a density. *possible: none is larger than a page. Errors: VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED. */
-static vsh_result placing_set(placing *p, double density, bool *possible, vsh_error *error) {
+static vsh_result set_density(placing *p, double density, bool *possible, vsh_error *error) {
     drop_masks(p);
     p->density = density;
     *possible = true;
     const int32_t longest = p->packing->width > p->packing->height ? p->packing->width : p->packing->height;
     for (size_t i = 0; i < p->count; ++i) {
-        const vshi_item *item = &p->items[i];
-        p->fits[i][0] =
-            vshi_mask_fit(item->patch, item->boxes, 0, density * item->factor, p->packing->max_stretch);
+        const vshi_pack_item *item = &p->items[i];
+        p->fits[i][0] = vshi_mask_fit(item->patch, 0, density * item->factor, p->packing->max_stretch);
         const vshi_fit *fit = &p->fits[i][0];
         const int32_t longer = fit->width > fit->height ? fit->width : fit->height;
         *possible = *possible && longer <= longest;
@@ -402,34 +392,34 @@ static vsh_result placing_set(placing *p, double density, bool *possible, vsh_er
 
 /* --- places */
 
-/* Where a chart's box is all that it is, turning it over changes nothing. */
-static int turns_of(const vshi_mask *mask) {
-    return vshi_mask_is_box(mask) ? (mask->width == mask->height ? 1 : 2) : VSHI_QUARTERS;
+/* Turns that differ: a chart that fills its box looks the same after half a turn. */
+static int count_turns(const vshi_mask *mask) {
+    const bool box = mask->touched == (uint64_t)mask->width * (uint64_t)mask->height;
+    return !box ? VSHI_QUARTERS : mask->width == mask->height ? 1 : 2;
 }
 
-static int32_t *hint_of(placing *p, const vshi_mask *mask) {
+static int32_t *find_hint(placing *p, const vshi_mask *mask) {
     return mask->width < HINT_SIDE && mask->height < HINT_SIDE
                ? &p->hints[mask->height * HINT_SIDE + mask->width]
                : NULL;
 }
 
-/* Finds the item's place in the page and takes it; *placed tells whether there was one. Turned masks are kept
- * for the next time. */
-static vsh_result place(placing *p, uint32_t index, bool *placed, vsh_error *error) {
+/* Places an item in the page; *placed tells whether there was room. Keeps the turned masks. */
+static vsh_result place_item(placing *p, uint32_t index, bool *placed, vsh_error *error) {
     vshi_place *at = &p->items[index].at;
     int32_t best_end = p->page.height;
     const vshi_mask *best = NULL;
     *placed = false;
     for (int n = 0; n < p->angles[index]; ++n) {
         vshi_mask *masks = &p->masks[index][VSHI_QUARTERS * n];
-        for (int t = 0; t < turns_of(masks); ++t) {
+        for (int t = 0; t < count_turns(masks); ++t) {
             vshi_mask *turned = &masks[t];
             int32_t x, y;
             if (turned->runs == NULL) {
                 VSHI_TRY(vshi_mask_turn(masks, t, turned, error));
             }
-            int32_t *hint = hint_of(p, turned);
-            const bool found = page_find(&p->page, turned, hint != NULL ? *hint : 0, best_end, &x, &y);
+            int32_t *hint = find_hint(p, turned);
+            const bool found = find_place(&p->page, turned, hint != NULL ? *hint : 0, best_end, &x, &y);
             if (found && hint != NULL) {
                 *hint = y;
             }
@@ -449,25 +439,25 @@ static vsh_result place(placing *p, uint32_t index, bool *placed, vsh_error *err
     if (*placed) {
         at->fit = p->fits[index][at->angle];
         at->touched = best->touched;
-        page_put(&p->page, best, at->x, at->y);
+        mark_taken(&p->page, best, at->x, at->y);
     }
     return VSH_OK;
 }
 
-/* Places the items of one page, those of the wanted meshes or, NULL, all that have none yet. Ends at the
- * first that finds no place where `stop`; *failed is its mesh, or VSHI_NONE. */
+/* Places the items of one page: those of the wanted meshes or, with NULL, all without a place. With `stop`,
+ * ends at the first item without room. *failed is its mesh, or VSHI_NONE. */
 static vsh_result fill_page(placing *p, const uint8_t *wanted, uint32_t page, bool stop, uint32_t *failed,
                             vsh_error *error) {
     *failed = VSHI_NONE;
     page_clear(&p->page);
     memset(p->hints, 0, HINT_SIDE * HINT_SIDE * sizeof *p->hints);
     for (size_t i = 0; i < p->count; ++i) {
-        vshi_item *item = &p->items[p->order[i]];
+        vshi_pack_item *item = &p->items[p->order[i]];
         if (item->at.page != VSHI_NONE || (wanted != NULL && !wanted[item->mesh])) {
             continue;
         }
         bool placed = false;
-        VSHI_TRY(place(p, p->order[i], &placed, error));
+        VSHI_TRY(place_item(p, p->order[i], &placed, error));
         if (placed) {
             item->at.page = page;
         } else {
@@ -483,15 +473,15 @@ static vsh_result fill_page(placing *p, const uint8_t *wanted, uint32_t page, bo
     return VSH_OK;
 }
 
-/* Meshes by the texels that they have left to place. */
+/* Meshes with items that are still to be placed. */
 typedef struct pool {
-    sort_key *meshes; /* [mesh_count], the largest first */
+    sort_key *meshes; /* [mesh_count], the largest first; one block with `wanted` */
     uint32_t count;
-    uint8_t *wanted; /* [most mesh + 1] */
+    uint8_t *wanted; /* [highest mesh + 1] */
 } pool;
 
 static double padded_area(const placing *p, size_t i) {
-    /* half of the padding around it is its own */
+    /* half of the padding around a chart counts as its own */
     const vshi_fit *fit = &p->fits[i][0];
     return (double)p->masks[i][0].touched + 0.5 * p->packing->padding * 2.0 * (fit->width + fit->height);
 }
@@ -501,8 +491,9 @@ static vsh_result pool_make(const placing *p, pool *o, vsh_error *error) {
     for (size_t i = 0; i < p->count; ++i) {
         most = p->items[i].mesh > most ? p->items[i].mesh : most;
     }
-    VSHI_TRY(vshi_allocate((void **)&o->meshes, (size_t)most + 1, sizeof *o->meshes, what, error));
-    VSHI_TRY(vshi_allocate((void **)&o->wanted, (size_t)most + 1, 1, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(o->meshes, (size_t)most + 1),
+                                 VSHI_ARRAY(o->wanted, (size_t)most + 1)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (size_t i = 0; i < p->count; ++i) { /* items are in the order of their meshes */
         if (i == 0 || p->items[i].mesh != p->items[i - 1].mesh) {
             o->meshes[o->count++] = (sort_key){0.0, 0, p->items[i].mesh};
@@ -513,8 +504,8 @@ static vsh_result pool_make(const placing *p, pool *o, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Whether every item has a page, from the meshes' point of view: drops those that have. */
-static void pool_drop_placed(const placing *p, pool *o) {
+/* Drops the meshes all of whose items have a page. */
+static void drop_placed(const placing *p, pool *o) {
     for (uint32_t m = 0; m < o->count; ++m) {
         o->wanted[o->meshes[m].item] = 0;
     }
@@ -530,15 +521,15 @@ static void pool_drop_placed(const placing *p, pool *o) {
     o->count = kept;
 }
 
-/* Takes the items of a page, or with VSHI_NONE all, off. */
-static void take_back(placing *p, uint32_t page) {
+/* Removes the items of a page, or with VSHI_NONE all, from their page. */
+static void clear_places(placing *p, uint32_t page) {
     for (size_t i = 0; i < p->count; ++i) {
         uint32_t *own = &p->items[i].at.page;
         *own = page == VSHI_NONE || *own == page ? VSHI_NONE : *own;
     }
 }
 
-/* One page of several: as many meshes as fit it. */
+/* Fills one of several pages with as many meshes as fit. */
 static vsh_result fill_with_meshes(placing *p, pool *o, uint32_t page, vsh_error *error) {
     const double room = HOPE * p->packing->width * p->packing->height;
     double sum = 0.0;
@@ -552,10 +543,10 @@ static vsh_result fill_with_meshes(placing *p, pool *o, uint32_t page, vsh_error
     for (;;) {
         VSHI_TRY(fill_page(p, o->wanted, page, chosen > 1, &failed, error));
         if (failed == VSHI_NONE || chosen <= 1) {
-            return VSH_OK; /* the rest of a mesh that is larger than a page goes on the next */
+            return VSH_OK; /* a mesh larger than a page continues on the next */
         }
-        take_back(p, page);
-        /* the smallest of those that are wanted: what is left is closest to the room that there is */
+        clear_places(p, page);
+        /* drop the smallest wanted mesh: that leaves the fullest page */
         for (uint32_t m = o->count; m-- > 0;) {
             if (o->wanted[o->meshes[m].item]) {
                 o->wanted[o->meshes[m].item] = 0;
@@ -566,34 +557,33 @@ static vsh_result fill_with_meshes(placing *p, pool *o, uint32_t page, vsh_error
     }
 }
 
-/* Places all items on one page or, where that has no room, on as many as it takes: max_pages + 1 where they
- * do not fit. *rows is how many rows they take of one page, or more than it has. Errors: VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
-static vsh_result placing_place(placing *p, uint32_t *pages, int32_t *rows, vsh_error *error) {
+/* Places all items on one page or, without room there, on as many as needed; max_pages + 1 if they do not
+ * fit. *rows counts the rows used of one page, and is more than its height if that is too small. Errors:
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+static vsh_result place_all(placing *p, uint32_t *pages, int32_t *rows, vsh_error *error) {
     const uint32_t most = p->packing->max_pages;
     uint32_t failed = VSHI_NONE;
     *pages = 1;
-    take_back(p, VSHI_NONE);
+    clear_places(p, VSHI_NONE);
     VSHI_TRY(fill_page(p, NULL, 0, true, &failed, error));
     *rows = failed == VSHI_NONE ? p->page.used : p->page.height + 1;
     if (failed == VSHI_NONE || most == 1) {
         return VSH_OK;
     }
     *pages = most + 1;
-    take_back(p, VSHI_NONE);
+    clear_places(p, VSHI_NONE);
     pool o = {0};
     vsh_result result;
     VSHI_TRY_DONE(pool_make(p, &o, error));
     for (uint32_t page = 0; page < most; ++page) {
         VSHI_TRY_DONE(fill_with_meshes(p, &o, page, error));
-        pool_drop_placed(p, &o);
+        drop_placed(p, &o);
         if (o.count == 0) {
             *pages = page + 1;
             break;
         }
     }
 done:
-    free(o.wanted);
     free(o.meshes);
     return result;
 }
@@ -602,9 +592,9 @@ done:
 
 static const double EXPECTED = 0.93; /* share of the pages that padded charts are expected to fill */
 static const double CLOSE = 0.998;   /* of the density at which rows would just fit */
-static const double SHRINK = 0.97;   /* of the density where it is not known by how much charts do not fit */
-static const double CLIMB = 1.008, LEAST_CLIMB = 1.001; /* from one that fits to the next that is tried */
-static const double OVER = 100.0;                       /* stands for: it is not known by how much */
+static const double SHRINK = 0.97;   /* of the density if the excess is unknown */
+static const double CLIMB = 1.008, LEAST_CLIMB = 1.001; /* from one that fits to the next attempt */
+static const double OVER = 100.0;                       /* an unknown excess */
 
 enum {
     SMALLER = 4,
@@ -632,19 +622,19 @@ double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
 
 typedef struct search {
     vshi_packing *packing;
-    vshi_item *items;
+    vshi_pack_item *items;
     size_t count;
     placing placing;
-    vshi_place *best;    /* [count] */
+    vshi_place *best;    /* [count]; one block with `order` */
     double best_density; /* 0: none yet */
     uint32_t best_pages;
     vshi_job *job;
     uint32_t *order; /* [count]: of rehearsals */
     bool has_order;
-    size_t units, told; /* of the job: all, and what it was told of */
+    size_t units, reported; /* of the job's progress: all, and so far */
 } search;
 
-static void keep(search *s, double density, uint32_t pages) {
+static void keep_places(search *s, double density, uint32_t pages) {
     for (size_t i = 0; i < s->count; ++i) {
         s->best[i] = s->items[i].at;
     }
@@ -652,7 +642,7 @@ static void keep(search *s, double density, uint32_t pages) {
     s->best_pages = pages;
 }
 
-static void give(search *s) {
+static void restore_best(search *s) {
     for (size_t i = 0; i < s->count; ++i) {
         s->items[i].at = s->best[i];
     }
@@ -662,12 +652,12 @@ static void give(search *s) {
 
 /* --- an order found by rehearsals on a small page */
 
-/* Rows that the order takes, and less than one for how low its charts end: the lower, the better. */
+/* Rows that the order takes, plus a fraction for how low its charts begin: the less, the better. */
 static vsh_result rehearse(placing *p, double *result_rows, vsh_error *error) {
     uint32_t pages = 0;
     int32_t rows = 0;
     double ends = 0.0;
-    VSHI_TRY(placing_place(p, &pages, &rows, error));
+    VSHI_TRY(place_all(p, &pages, &rows, error));
     for (size_t i = 0; i < p->count; ++i) {
         ends += p->items[i].at.y;
     }
@@ -696,8 +686,7 @@ static void move_one(uint32_t *order, size_t count, uint64_t *state) {
     order[to] = moved;
 }
 
-/* Fills s->order: charts in the order in which some hundred attempts on a page of a quarter of the size went
- * best. */
+/* Fills s->order with the best order of some hundred attempts on a page of a quarter of the size. */
 static vsh_result find_order(search *s, double density, int tries, vsh_error *error) {
     vshi_packing small = *s->packing;
     small.width = (small.width + SMALLER - 1) / SMALLER;
@@ -710,9 +699,9 @@ static vsh_result find_order(search *s, double density, int tries, vsh_error *er
     vsh_result result;
     VSHI_TRY_DONE(placing_begin(&small, 2 * small.height, s->items, s->count, s->job, &p, error));
     p.least_turned = (p.least_turned + SMALLER - 1) / SMALLER;
-    VSHI_TRY_DONE(placing_set(&p, density / SMALLER, &s->has_order, error));
+    VSHI_TRY_DONE(set_density(&p, density / SMALLER, &s->has_order, error));
     for (int by = 0; by < ORDERS && s->has_order; ++by) {
-        VSHI_TRY_DONE(placing_sort(&p, by, error));
+        VSHI_TRY_DONE(sort_items(&p, by, error));
         VSHI_TRY_DONE(rehearse(&p, &rows, error));
         if (rows < best) {
             best = rows;
@@ -735,65 +724,65 @@ done:
     return result;
 }
 
-/* How many attempts there will be is not known: each is some share of a guess, and the end is kept for the
+/* The number of attempts is unknown: each advances by a share of a guess, and the last share is left for the
  * end. */
-static void tell_attempt(search *s) {
+static void report_attempt(search *s) {
     const size_t share = s->units / ATTEMPTS;
-    if (s->told + share < s->units) {
+    if (s->reported + share < s->units) {
         vshi_job_advance(s->job, share);
-        s->told += share;
+        s->reported += share;
     }
 }
 
-/* Attempts at a density in the first `orders` orders, until one fits. *over is the least that one takes of
- * the room there is; above 1 none fits. */
+/* Attempts a density in the first `orders` orders, until one fits. *over is the least room needed over the
+ * room there is; above 1 none fits. */
 static vsh_result attempt(search *s, double density, int orders, double *over, vsh_error *error) {
     placing *p = &s->placing;
     bool possible = false;
     *over = INFINITY;
-    VSHI_TRY(placing_set(p, density, &possible, error));
+    VSHI_TRY(set_density(p, density, &possible, error));
     for (int order = s->has_order ? REHEARSED : 0; order < orders && possible && *over > 1.0; ++order) {
         uint32_t pages = 0;
         int32_t rows = 0;
         if (order == REHEARSED) {
             memcpy(p->order, s->order, s->count * sizeof *s->order);
         } else {
-            VSHI_TRY(placing_sort(p, order, error));
+            VSHI_TRY(sort_items(p, order, error));
         }
-        VSHI_TRY(placing_place(p, &pages, &rows, error));
+        VSHI_TRY(place_all(p, &pages, &rows, error));
         *over = fmin(*over, s->packing->max_pages == 1       ? (double)rows / s->packing->height
                             : pages <= s->packing->max_pages ? 1.0
                                                              : OVER);
-        tell_attempt(s);
+        report_attempt(s);
         if (*over <= 1.0 && density > s->best_density) {
-            keep(s, density, pages);
+            keep_places(s, density, pages);
         }
     }
     return VSH_OK;
 }
 
-/* Texels that the charts take at a density, with the padding between them. */
-static double expected_area(const search *s, double density) {
+/* Texels for the charts at a density, with the padding between them. */
+static double estimate_area(const search *s, double density) {
     double sum = 0.0;
     for (size_t i = 0; i < s->count; ++i) {
-        const vshi_item *item = &s->items[i];
-        const double k = density * item->factor, width = item->boxes->size[0][0] * k,
-                     height = item->boxes->size[0][1] * k, gap = s->packing->padding + 1.0,
-                     share = item->patch->area / (item->boxes->size[0][0] * item->boxes->size[0][1]);
-        /* what is left free of a box is of use to others in part */
+        const vshi_pack_item *item = &s->items[i];
+        const double *size = item->patch->size[0];
+        const double k = density * item->factor, width = size[0] * k, height = size[1] * k,
+                     gap = s->packing->padding + 1.0, share = item->patch->area / (size[0] * size[1]);
+        /* other charts use a part of the free texels of a box */
         sum += (width + gap) * (height + gap) * (share > 0.0 ? sqrt(share < 1.0 ? share : 1.0) : 1.0);
     }
     return sum;
 }
 
-static double first_guess(const search *s) {
+static double guess_density(const search *s) {
     const double room = EXPECTED * s->packing->width * s->packing->height * s->packing->max_pages;
     double low = 0.0, high = 1.0;
-    while (high < 1e150 && expected_area(s, high) < room) {
+    while (high < 1e150 && estimate_area(s, high) < room) {
         high *= 2.0;
     }
     while (high > 1e-150 && low == 0.0) {
-        if (expected_area(s, 0.5 * high) < room) {
+        if (estimate_area(s, 0.5 * high) < room) {
             low = 0.5 * high;
         } else {
             high *= 0.5;
@@ -801,7 +790,7 @@ static double first_guess(const search *s) {
     }
     for (int i = 0; i < 40; ++i) {
         const double middle = 0.5 * (low + high);
-        if (expected_area(s, middle) < room) {
+        if (estimate_area(s, middle) < room) {
             low = middle;
         } else {
             high = middle;
@@ -818,8 +807,8 @@ static size_t count_triangles(const search *s) {
     return triangles;
 }
 
-/* How many rehearsals a packing is worth: in step with what making the charts has taken. */
-static int rehearsals(const search *s) {
+/* Rehearsals grow with the time spent on making the charts. */
+static int count_rehearsals(const search *s) {
     const size_t tries = count_triangles(s) / PER_REHEARSAL;
     return s->packing->max_pages > 1 || s->count < 2 || s->count > FEW ? 0
            : tries < LEAST_REHEARSALS                                  ? LEAST_REHEARSALS
@@ -827,10 +816,10 @@ static int rehearsals(const search *s) {
                                                                        : (int)tries;
 }
 
-/* The greatest density that fits, as far as some attempts find it. */
+/* The greatest density that fits among some attempts. */
 static vsh_result find_density(search *s, int orders, int climbs, vsh_error *error) {
-    double density = first_guess(s), over = INFINITY, shrink = SHRINK;
-    const int tries = rehearsals(s);
+    double density = guess_density(s), over = INFINITY, shrink = SHRINK;
+    const int tries = count_rehearsals(s);
     if (tries > 0) {
         VSHI_TRY(find_order(s, density, tries, error));
         orders = 1;
@@ -869,26 +858,26 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
     return VSH_OK;
 }
 
-vsh_result vshi_pack_one(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, bool *fits,
-                         vsh_error *error) {
+vsh_result vshi_pack_one(vshi_packing *packing, vshi_pack_item *items, size_t count, vshi_job *job,
+                         bool *fits, vsh_error *error) {
     search s = {.packing = packing, .items = items, .count = count, .job = job};
     double over = INFINITY;
     vsh_result result;
     *fits = false;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, what, error));
-    keep(&s, 0.0, 1);
+    keep_places(&s, 0.0, 1);
     VSHI_TRY_DONE(placing_begin(packing, packing->height, items, count, job, &s.placing, error));
     VSHI_TRY_DONE(attempt(&s, packing->density, ORDERS, &over, error));
     *fits = over <= 1.0;
     s.best_density = packing->density;
-    give(&s);
+    restore_best(&s);
 done:
     placing_free(&s.placing);
     free(s.best);
     return result;
 }
 
-vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi_job *job, size_t units,
+vsh_result vshi_pack(vshi_packing *packing, vshi_pack_item *items, size_t count, vshi_job *job, size_t units,
                      vsh_error *error) {
     search s = {.packing = packing, .items = items, .count = count, .job = job, .units = units};
     const double asked = packing->density;
@@ -899,8 +888,8 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
                        : count < LEGION                           ? 2
                                                                   : 1;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&s.order, count, sizeof *s.order, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(s.best, count), VSHI_ARRAY(s.order, count)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     VSHI_TRY_DONE(placing_begin(packing, height, items, count, job, &s.placing, error));
     if (asked > 0.0) {
         double over = INFINITY;
@@ -917,13 +906,12 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_item *items, size_t count, vshi
     } else {
         VSHI_TRY_DONE(find_density(&s, orders, climbs, error));
     }
-    give(&s);
-    if (vshi_job_advance(job, units - s.told)) {
+    restore_best(&s);
+    if (vshi_job_advance(job, units - s.reported)) {
         result = vshi_job_fail_cancelled(job, error);
     }
 done:
     placing_free(&s.placing);
-    free(s.order);
     free(s.best);
     return result;
 }

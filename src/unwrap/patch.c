@@ -1,22 +1,21 @@
-/* Charts as meshes of their own. One that folds or stretches is cut in two between its triangles that are the
- * farthest from each other, along the border where regions grown from both meet; each half is laid out anew.
- * A triangle alone always lies flat. */
-#include "unwrap/patch.h"
+/* Charts as meshes of their own. A chart that folds or stretches is cut in two: regions grow from its two
+ * farthest triangles, and the cut runs where they meet. Each half is laid out anew. A single triangle always
+ * lies flat. */
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
-#include "mesh/weld.h"
-#include "unwrap/heap.h"
+#include "mesh/edges.h"
+#include "unwrap/charts.h"
 
 #include <stdlib.h>
 
 static const char what[] = "a chart";
 
-/* Cuts run where surfaces bend: a way between two triangles is longer by so many sizes of the chart for each
- * radian or so between their normals. */
+/* Cuts should run where surfaces bend. So paths get longer by so many sizes of the chart for each radian or
+ * so between the normals of two triangles. */
 static const double BEND = 1.0;
 
-/* After so many triangles that were alone in their half, a chart is cut into all its triangles: what behaves
- * so is no surface. */
+/* After so many cuts, a chart falls into its triangles: it is no surface. */
 enum { FULL_DEPTH = 64 };
 
 static int compare_triangles(const void *a, const void *b) {
@@ -35,11 +34,11 @@ static void find_beyond(vshi_patch *p) {
 }
 
 static vsh_result number_vertices(vshi_patch *p, vsh_error *error) {
-    uint32_t *up = NULL, *number = NULL;
+    uint32_t *up, *number;
     const uint32_t corners = 3 * p->count;
+    const vshi_array arrays[] = {VSHI_ARRAY(up, corners), VSHI_ARRAY(number, corners)};
     vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&up, corners, sizeof *up, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&number, corners, sizeof *number, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (uint32_t c = 0; c < corners; ++c) {
         up[c] = c;
     }
@@ -50,15 +49,15 @@ static vsh_result number_vertices(vshi_patch *p, vsh_error *error) {
             vshi_set_join(up, vshi_next_side(side), other);
         }
     }
-    for (uint32_t c = 0; c < corners; ++c) { /* roots are the lowest of theirs */
+    for (uint32_t c = 0; c < corners; ++c) { /* a root is the lowest of its set */
         const uint32_t r = vshi_set_of(up, c);
         if (r == c) {
             number[c] = p->vertex_count++;
         }
         p->corner[c / 3][c % 3] = number[r];
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&p->place, p->vertex_count, sizeof *p->place, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&p->uv, p->vertex_count, sizeof *p->uv, what, error));
+    const vshi_array own[] = {VSHI_ARRAY(p->place, p->vertex_count), VSHI_ARRAY(p->uv, p->vertex_count)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(own, what, error));
     for (uint32_t i = 0; i < p->count; ++i) {
         vshi_vec at[3];
         vshi_cut_mesh_corners(p->surface, p->triangles[i], at);
@@ -68,7 +67,6 @@ static vsh_result number_vertices(vshi_patch *p, vsh_error *error) {
         p->area += p->surface->area[p->triangles[i]];
     }
 done:
-    free(number);
     free(up);
     return result;
 }
@@ -76,28 +74,28 @@ done:
 vsh_result vshi_patch_make(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, vshi_patch *p,
                            vsh_error *error) {
     *p = (vshi_patch){.surface = surface, .triangles = triangles, .count = count, .stretch = 1.0};
-    VSHI_TRY(vshi_allocate((void **)&p->corner, count, sizeof *p->corner, what, error));
-    VSHI_TRY(vshi_allocate((void **)&p->beyond, count, 3 * sizeof *p->beyond, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(p->corner, count), VSHI_ARRAY(p->beyond, 3 * (size_t)count)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     find_beyond(p);
     return number_vertices(p, error);
 }
 
 void vshi_patch_free(vshi_patch *p) {
-    free(p->uv);
     free(p->place);
-    free(p->beyond);
     free(p->corner);
     free(p->triangles);
     *p = (vshi_patch){0};
 }
 
-void vshi_patch_box(const vshi_patch *p, double low[2], double high[2]) {
-    for (int k = 0; k < 2; ++k) {
-        low[k] = INFINITY;
-        high[k] = -INFINITY;
-        for (uint32_t v = 0; v < p->vertex_count; ++v) {
-            low[k] = p->uv[v][k] < low[k] ? p->uv[v][k] : low[k];
-            high[k] = p->uv[v][k] > high[k] ? p->uv[v][k] : high[k];
+void vshi_patch_box(const vshi_patch *p, const double turn[2], double low[2], double high[2]) {
+    low[0] = low[1] = INFINITY;
+    high[0] = high[1] = -INFINITY;
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        const double *uv = p->uv[v];
+        const double at[2] = {turn[0] * uv[0] - turn[1] * uv[1], turn[1] * uv[0] + turn[0] * uv[1]};
+        for (int k = 0; k < 2; ++k) {
+            low[k] = at[k] < low[k] ? at[k] : low[k];
+            high[k] = at[k] > high[k] ? at[k] : high[k];
         }
     }
 }
@@ -125,10 +123,10 @@ void vshi_patches_free(vshi_patches *patches) {
 
 vsh_result vshi_patches_split(const vshi_patch *p, const uint32_t *part, uint32_t parts, vshi_patches *to,
                               vsh_error *error) {
-    uint32_t *begin = NULL, *list = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&begin, (size_t)parts + 2, sizeof *begin, what, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&list, p->count, sizeof *list, what, error));
+    uint32_t *begin, *list;
+    const vshi_array arrays[] = {VSHI_ARRAY(begin, (size_t)parts + 2), VSHI_ARRAY(list, p->count)};
+    vsh_result result = VSH_OK;
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     vshi_list_groups(part, p->count, parts, begin, list);
     for (uint32_t k = parts; k-- > 0;) {
         vshi_patch own = {.count = begin[k + 1] - begin[k], .depth = p->depth + 1};
@@ -139,7 +137,6 @@ vsh_result vshi_patches_split(const vshi_patch *p, const uint32_t *part, uint32_
         VSHI_TRY_DONE(vshi_patches_add(to, &own, error));
     }
 done:
-    free(list);
     free(begin);
     return result;
 }
@@ -147,38 +144,38 @@ done:
 typedef struct splitting {
     const vshi_patch *patch;
     vshi_heap heap;
-    double *far;     /* [count]: way from the seeds */
+    double *far;     /* [count]: length of the path from the seeds; one block with `owner` */
     uint32_t *owner; /* [count]: 0, 1; VSHI_NONE: not reached */
     double bend;
     bool whole_units; /* triangles of a unit stay together */
 } splitting;
 
-static vshi_vec middle_of(const vshi_patch *p, uint32_t i) {
+static vshi_vec find_middle(const vshi_patch *p, uint32_t i) {
     return vshi_scale(
         vshi_add(p->place[p->corner[i][0]], vshi_add(p->place[p->corner[i][1]], p->place[p->corner[i][2]])),
         1.0 / 3.0);
 }
 
-static bool one_unit(const splitting *s, uint32_t a, uint32_t b) {
+static bool share_unit(const splitting *s, uint32_t a, uint32_t b) {
     const vshi_patch *p = s->patch;
     return s->whole_units && p->surface->unit[p->triangles[a]] == p->surface->unit[p->triangles[b]];
 }
 
-static double way(const splitting *s, uint32_t a, uint32_t b) {
+static double measure_step(const splitting *s, uint32_t a, uint32_t b) {
     const vshi_patch *p = s->patch;
     const vshi_cut_mesh *surface = p->surface;
     const uint32_t ta = p->triangles[a], tb = p->triangles[b];
-    if (one_unit(s, a, b)) {
+    if (share_unit(s, a, b)) {
         return 0.0;
     }
-    return vshi_length(vshi_sub(middle_of(p, a), middle_of(p, b))) +
+    return vshi_length(vshi_sub(find_middle(p, a), find_middle(p, b))) +
            s->bend * (1.0 - vshi_dot(surface->normal[ta], surface->normal[tb]));
 }
 
-/* Shortest ways over triangles (Dijkstra, 1959) from the seeds, owner i being seeds[i]. Returns the last one
- * that was reached. */
-static vsh_result reach(splitting *s, const uint32_t *seeds, uint32_t seed_count, uint32_t *last,
-                        vsh_error *error) {
+/* Shortest paths over triangles (Dijkstra, 1959) from the seeds; seeds[i] is owner i. *last is the last
+ * triangle reached. */
+static vsh_result find_paths(splitting *s, const uint32_t *seeds, uint32_t seed_count, uint32_t *last,
+                             vsh_error *error) {
     const vshi_patch *p = s->patch;
     s->heap.count = 0;
     for (uint32_t i = 0; i < p->count; ++i) {
@@ -201,8 +198,8 @@ static vsh_result reach(splitting *s, const uint32_t *seeds, uint32_t seed_count
             if (s->owner[other] != VSHI_NONE) {
                 continue;
             }
-            const double far = s->far[next.what] + way(s, next.what, other);
-            if (one_unit(s, next.what, other)) { /* before anything else is */
+            const double far = s->far[next.what] + measure_step(s, next.what, other);
+            if (share_unit(s, next.what, other)) { /* comes before everything else */
                 s->far[other] = far;
                 VSHI_TRY(vshi_heap_push(&s->heap, -1.0, other, next.by, error));
             } else if (far < s->far[other]) {
@@ -214,7 +211,7 @@ static vsh_result reach(splitting *s, const uint32_t *seeds, uint32_t seed_count
     return VSH_OK;
 }
 
-/* Owner of each triangle in two halves; false where all are one unit, and stay together. */
+/* Finds the half of each triangle. *halved is false if all are one unit, which stays together. */
 static vsh_result halve(splitting *s, bool *halved, vsh_error *error) {
     const vshi_patch *p = s->patch;
     uint32_t seeds[2] = {0, 0};
@@ -223,20 +220,20 @@ static vsh_result halve(splitting *s, bool *halved, vsh_error *error) {
         size = fmax(size, vshi_length(vshi_sub(p->place[v], p->place[0])));
     }
     s->bend = BEND * size;
-    VSHI_TRY(reach(s, seeds, 1, &seeds[0], error));
-    VSHI_TRY(reach(s, seeds, 1, &seeds[1], error));
+    VSHI_TRY(find_paths(s, seeds, 1, &seeds[0], error));
+    VSHI_TRY(find_paths(s, seeds, 1, &seeds[1], error));
     const uint32_t a = p->triangles[seeds[0]], b = p->triangles[seeds[1]];
     *halved = a != b && (!s->whole_units || p->surface->unit[a] != p->surface->unit[b]);
-    return *halved ? reach(s, seeds, 2, &(uint32_t){0}, error) : VSH_OK;
+    return *halved ? find_paths(s, seeds, 2, &(uint32_t){0}, error) : VSH_OK;
 }
 
-/* Adds the parts that a chart is cut into to those that wait to be laid out. */
+/* Cuts a chart, and adds its parts to those that wait to be laid out. */
 static vsh_result cut(const vshi_patch *p, vshi_patches *waiting, vsh_error *error) {
     splitting s = {.patch = p, .whole_units = true};
     const vshi_array arrays[] = {VSHI_ARRAY(s.far, p->count), VSHI_ARRAY(s.owner, p->count)};
     bool halved = false;
     vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     if (p->depth < FULL_DEPTH) {
         VSHI_TRY_DONE(halve(&s, &halved, error));
         if (!halved) {
@@ -249,7 +246,6 @@ static vsh_result cut(const vshi_patch *p, vshi_patches *waiting, vsh_error *err
     }
     result = vshi_patches_split(p, s.owner, halved ? 2 : p->count, waiting, error);
 done:
-    free(s.owner);
     free(s.far);
     free(s.heap.entries);
     return result;

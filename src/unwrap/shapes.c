@@ -1,22 +1,21 @@
-/* Charts of all shapes: each step over all of them at once, so that one large mesh and a thousand small ones
- * keep threads busy alike. */
-#include "unwrap/shapes.h"
+/* Charts of all shapes. Each step works on all shapes at once, so that one large mesh and a thousand small
+ * ones keep all threads busy. */
+#include "unwrap/charts.h"
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "mesh/edges.h"
 #include "mesh/mesh.h"
-#include "mesh/weld.h"
 
 #include <stdlib.h>
 
 static const char what[] = "charts of meshes";
 
-/* Two transforms are alike if the products of their axes, over their sum, differ by no more. Those made of
- * 32-bit quaternions differ by 1e-7 or so. */
+/* Two transforms are alike if the products of their axes, over their sum, differ by no more. Transforms made
+ * of 32-bit quaternions differ by 1e-7 or so. */
 static const double ALIKE = 1e-5;
 
-/* Share of all charts' area that charts are joined to: larger ones leave gaps between them that nothing
- * fills. */
+/* Most share of all charts' area for a joined chart: larger ones leave gaps that nothing fills. */
 static const double LARGEST = 0.35;
 
 enum {
@@ -27,8 +26,8 @@ enum {
 
 /* --- instances */
 
-/* Returns a transform's size, the root of the sum of its axes' squares. `gram` is what is equal where the
- * transforms differ by a similarity: dot products of the axes, over the sum of their squares. */
+/* Returns a transform's size, the root of the sum of its axes' squares. `gram`: dot products of the axes over
+ * the sum of their squares, equal for transforms that differ by a similarity. */
 static double measure_transform(const double *m, double gram[6]) {
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     m = m != NULL ? m : identity;
@@ -66,10 +65,9 @@ static bool are_alike(const double *a, const double *b) {
     return true;
 }
 
-/* Meshes of the same arrays have the same `arrays`. */
 typedef struct array_set {
-    uintptr_t arrays[6];
-    size_t index; /* of the mesh */
+    uintptr_t arrays[6]; /* equal for meshes of the same arrays */
+    size_t index;        /* of the mesh */
 } array_set;
 
 static int compare_arrays(const array_set *x, const array_set *y) {
@@ -87,8 +85,8 @@ static int compare_meshes(const void *a, const void *b) {
     return arrays != 0 ? arrays : (x->index > y->index) - (x->index < y->index);
 }
 
-/* first[i]: the first mesh that mesh i is an instance of. No address shows in it: of one set of arrays,
- * meshes are looked at in their order. */
+/* first[i]: the first mesh that mesh i is an instance of. Addresses do not show in it: meshes of one set of
+ * arrays are compared in their order. */
 static vsh_result find_first(const vsh_mesh *meshes, size_t count, size_t *first, vsh_error *error) {
     array_set *sorted = NULL;
     VSHI_TRY(vshi_allocate((void **)&sorted, count, sizeof *sorted, what, error));
@@ -119,12 +117,11 @@ static vsh_result find_first(const vsh_mesh *meshes, size_t count, size_t *first
 vsh_result vshi_shapes_find(const vsh_mesh *meshes, size_t mesh_count, vshi_shapes *shapes,
                             vsh_error *error) {
     *shapes = (vshi_shapes){.meshes = meshes, .mesh_count = mesh_count};
-    size_t *first = NULL;
-    const vshi_array arrays[] = {VSHI_ARRAY(first, mesh_count), VSHI_ARRAY(shapes->list, mesh_count),
-                                 VSHI_ARRAY(shapes->instances, mesh_count)};
-    vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
-    VSHI_TRY_DONE(find_first(meshes, mesh_count, first, error));
+    size_t *first;
+    const vshi_array arrays[] = {VSHI_ARRAY(shapes->list, mesh_count),
+                                 VSHI_ARRAY(shapes->instances, mesh_count), VSHI_ARRAY(first, mesh_count)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    VSHI_TRY(find_first(meshes, mesh_count, first, error));
     for (size_t i = 0; i < mesh_count; ++i) {
         vshi_instance *instance = &shapes->instances[i];
         if (first[i] == i) {
@@ -137,32 +134,25 @@ vsh_result vshi_shapes_find(const vsh_mesh *meshes, size_t mesh_count, vshi_shap
                               measure_transform(meshes[first[i]].transform, gram);
         }
     }
-done:
-    free(first);
-    return result;
+    return VSH_OK;
 }
 
 void vshi_shapes_free(vshi_shapes *shapes) {
     for (size_t i = 0; i < shapes->count; ++i) {
-        vshi_shape *shape = &shapes->list[i];
-        free(shape->boxes);
-        vshi_patches_free(&shape->patches);
-        vshi_cut_mesh_free(&shape->surface);
+        vshi_patches_free(&shapes->list[i].patches);
+        vshi_cut_mesh_free(&shapes->list[i].surface);
     }
-    free(shapes->instances);
     free(shapes->list);
-    *shapes = (vshi_shapes){0};
 }
 
-/* --- charts joined to larger ones, as long as these lie as flat: fewer charts have fewer seams, and waste
- * less of the atlas on what keeps them apart */
+/* --- charts joined to larger ones that lie as flat: fewer charts have fewer seams, and need less padding */
 
-/* Two charts that are tried as one. */
+/* Two charts, joined on trial. */
 typedef struct trial {
     const struct merging *merging;
     uint32_t a, b;
     double perimeter; /* of both together */
-    vshi_patch patch; /* both as one, where it lies flat */
+    vshi_patch patch; /* both as one, if it lies flat */
     bool good;
 } trial;
 
@@ -170,7 +160,7 @@ typedef struct merging {
     const vshi_cut_mesh *surface;
     vshi_patches *patches;
     double max_stretch, max_area;
-    uint32_t *owner;   /* [triangles]: chart; VSHI_NONE: flat */
+    uint32_t *owner;   /* [triangles]: chart; VSHI_NONE: without area; one block with the four arrays below */
     double *perimeter; /* [charts] */
     uint32_t *version; /* [charts]: a number that no other chart had before */
     uint32_t versions;
@@ -180,17 +170,17 @@ typedef struct merging {
     size_t failed_count, failed_capacity;
 } merging;
 
-/* L2 stretch of a joined chart at most: the mean over all charts is to be within 1.05. */
+/* Most L2 stretch of a joined chart: the mean over all charts should stay within 1.05. */
 static const double MOST_STRETCH = 1.045;
 
 static const double LEAST_SHARED = 0.12; /* of the border of the chart that has less of it */
 static const double HARD = 0.3;          /* weight of a hard seam's length in the shared border */
 
 /* Square of a joined chart's perimeter over its area: 12.6 for a disc, 16 for a square, 25 for a rectangle of
- * 4 to 1. Charts beyond that are joined only where they become no worse. */
+ * 4 to 1. Charts beyond ROUND are joined only if that makes them no worse. */
 static const double ROUND = 28.0, NO_WORSE = 1.1;
 
-/* Begins with the charts of a surface, which must outlive the merging. No chart is joined to one of more than
+/* Begins with the charts of a surface, which must outlive the merging. No joined chart has more than
  * max_area, surface units². */
 static vsh_result merging_begin(const vshi_cut_mesh *s, vshi_patches *patches, double max_stretch,
                                 double max_area, merging *m, vsh_error *error) {
@@ -201,7 +191,7 @@ static vsh_result merging_begin(const vshi_cut_mesh *s, vshi_patches *patches, d
                    .max_stretch = fmin(max_stretch, MOST_STRETCH)};
     const vshi_array arrays[] = {VSHI_ARRAY(m->owner, s->count), VSHI_ARRAY(m->perimeter, count),
                                  VSHI_ARRAY(m->version, count), VSHI_ARRAY(m->trials, count / 2 + 1)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     memset(m->owner, 0xff, s->count * sizeof *m->owner);
     for (uint32_t c = 0; c < count; ++c) {
         const vshi_patch *p = &patches->list[c];
@@ -226,13 +216,8 @@ static void drop_trials(merging *m) {
 }
 
 static void merging_free(merging *m) {
-    if (m->trials != NULL) {
-        drop_trials(m);
-    }
+    drop_trials(m);
     free(m->failed);
-    free(m->trials);
-    free(m->version);
-    free(m->perimeter);
     free(m->owner);
     *m = (merging){0};
 }
@@ -267,18 +252,18 @@ static int compare_keys(const void *a, const void *b) {
     return (x > y) - (x < y);
 }
 
-static uint64_t key_of(const merging *m, uint32_t a, uint32_t b) {
+static uint64_t make_key(const merging *m, uint32_t a, uint32_t b) {
     const uint32_t x = m->version[a], y = m->version[b];
     return x < y ? (uint64_t)x << 32 | y : (uint64_t)y << 32 | x;
 }
 
 static bool has_failed(const merging *m, uint32_t a, uint32_t b) {
-    const uint64_t key = key_of(m, a, b);
+    const uint64_t key = make_key(m, a, b);
     return m->failed_count > 0 && bsearch(&key, m->failed, m->failed_count, sizeof key, compare_keys) != NULL;
 }
 
 /* Whether two charts would make a round one. */
-static bool promising(const merging *m, const border *pair) {
+static bool are_promising(const merging *m, const border *pair) {
     const double pa = m->perimeter[pair->a], pb = m->perimeter[pair->b], aa = m->patches->list[pair->a].area,
                  ab = m->patches->list[pair->b].area, joined = pa + pb - 2.0 * pair->length;
     const double roundness = joined * joined / (aa + ab), before = (pa * pa + pb * pb) / (aa + ab);
@@ -317,7 +302,7 @@ static vsh_result find_pairs(const merging *m, border **pairs, size_t *count, vs
 }
 
 /* Chooses the next round's trials; without any, all is done. */
-static vsh_result merging_plan(merging *m, vsh_error *error) {
+static vsh_result plan_trials(merging *m, vsh_error *error) {
     border *pairs = NULL;
     uint8_t *taken = NULL;
     size_t count = 0, kept = 0;
@@ -329,7 +314,7 @@ static vsh_result merging_plan(merging *m, vsh_error *error) {
         border pair = pairs[i];
         const double pa = m->perimeter[pair.a], pb = m->perimeter[pair.b];
         pair.shared /= pa < pb ? pa : pb;
-        if (promising(m, &pair)) {
+        if (are_promising(m, &pair)) {
             pairs[kept++] = pair;
         }
     }
@@ -354,7 +339,7 @@ done:
 }
 
 /* A vshi_element_fn over trials. */
-static vsh_result merging_try(void *user, size_t i, vsh_error *error) {
+static vsh_result run_trial(void *user, size_t i, vsh_error *error) {
     trial *one = ((trial **)user)[i];
     const merging *m = one->merging;
     const vshi_patch *a = &m->patches->list[one->a], *b = &m->patches->list[one->b];
@@ -394,14 +379,14 @@ static void close_up(merging *m) {
     m->patches->count = kept;
 }
 
-/* Takes those that are good. */
-static vsh_result merging_apply(merging *m, vsh_error *error) {
+/* Joins the charts of good trials, and remembers the others. */
+static vsh_result apply_trials(merging *m, vsh_error *error) {
     for (uint32_t i = 0; i < m->trial_count; ++i) {
         trial *one = &m->trials[i];
         if (!one->good) {
             VSHI_TRY(vshi_make_room((void **)&m->failed, m->failed_count, &m->failed_capacity,
                                     sizeof *m->failed, what, error));
-            m->failed[m->failed_count++] = key_of(m, one->a, one->b);
+            m->failed[m->failed_count++] = make_key(m, one->a, one->b);
             continue;
         }
         vshi_patch_free(&m->patches->list[one->a]);
@@ -424,10 +409,10 @@ static vsh_result merging_apply(merging *m, vsh_error *error) {
 
 /* --- all shapes */
 
-/* The charts of a shape as they are grown, and joined. */
+/* The charts of a shape while they are grown and joined. */
 typedef struct charting {
     uint32_t count;
-    uint32_t *begin;     /* [count + 2] in `triangles` */
+    uint32_t *begin;     /* [count + 2] in `triangles`; both are one block */
     uint32_t *triangles; /* by chart, ascending */
     merging merging;
 } charting;
@@ -451,7 +436,7 @@ static vsh_result grow_charts(const making *m, size_t i, vsh_error *error) {
     VSHI_TRY_DONE(vshi_grow_charts(s, m->job, chart, &of->count, error));
     const vshi_array arrays[] = {VSHI_ARRAY(of->begin, (size_t)of->count + 2),
                                  VSHI_ARRAY(of->triangles, s->count)};
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     vshi_list_groups(chart, s->count, of->count, of->begin, of->triangles);
 done:
     free(chart);
@@ -537,7 +522,7 @@ static vsh_result join_round(const making *m, size_t *trial_count, vsh_error *er
     for (size_t i = 0; i < m->shapes->count; ++i) {
         merging *of = &m->charting[i].merging;
         if (of->patches != NULL) {
-            VSHI_TRY(merging_plan(of, error));
+            VSHI_TRY(plan_trials(of, error));
             count += of->trial_count;
         }
     }
@@ -549,13 +534,13 @@ static vsh_result join_round(const making *m, size_t *trial_count, vsh_error *er
             trials[at++] = &of->trials[t];
         }
     }
-    VSHI_TRY_DONE(vshi_parallel_each(m->job, count, 2, 0, merging_try, trials, error));
+    VSHI_TRY_DONE(vshi_parallel_each(m->job, count, 2, 0, run_trial, trials, error));
     for (size_t i = 0; i < m->shapes->count; ++i) {
         merging *of = &m->charting[i].merging;
         if (of->trial_count > 0) {
-            VSHI_TRY_DONE(merging_apply(of, error));
+            VSHI_TRY_DONE(apply_trials(of, error));
         } else {
-            merging_free(of); /* nothing more to try, ever */
+            merging_free(of); /* nothing left to try */
         }
     }
 done:
@@ -564,7 +549,7 @@ done:
 }
 
 /* World units², of meshes begin … end - 1. */
-static double area_of(const vshi_shapes *shapes, size_t begin, size_t end) {
+static double sum_areas(const vshi_shapes *shapes, size_t begin, size_t end) {
     double sum = 0.0;
     for (size_t i = begin; i < end; ++i) {
         const vshi_shape *shape = &shapes->list[shapes->instances[i].shape];
@@ -578,18 +563,18 @@ static double area_of(const vshi_shapes *shapes, size_t begin, size_t end) {
     return sum;
 }
 
-/* Fills largest [shapes]: the most that a chart of each may have, world units² of its first mesh. Where
- * objects are packed alone, it is the least over its instances. */
+/* Fills largest[shapes]: the most area of a chart of each shape, world units² of its first mesh. If each
+ * object has its own page, the least over the shape's instances. */
 static void find_largest(const making *m, double *largest) {
     const vshi_shapes *shapes = m->shapes;
     const bool alone = m->options->atlas == VSH_ATLAS_OBJECTS;
-    const double all = alone ? INFINITY : area_of(shapes, 0, shapes->mesh_count);
+    const double all = alone ? INFINITY : sum_areas(shapes, 0, shapes->mesh_count);
     for (size_t i = 0; i < shapes->count; ++i) {
         largest[i] = LARGEST * all;
     }
     for (size_t first = 0, size; alone && first < shapes->mesh_count; first += size) {
         size = vshi_mesh_object_size(shapes->meshes, first, shapes->mesh_count);
-        const double area = area_of(shapes, first, first + size);
+        const double area = sum_areas(shapes, first, first + size);
         for (size_t i = first; i < first + size; ++i) {
             const vshi_instance *instance = &shapes->instances[i];
             const double own = LARGEST * area / (instance->scale * instance->scale);
@@ -623,16 +608,13 @@ done:
     return result;
 }
 
-/* --- boxes */
-
 /* A vshi_element_fn over shapes. */
 static vsh_result straighten_shape(void *user, size_t i, vsh_error *error) {
     const making *m = user;
     vshi_shape *shape = &m->shapes->list[i];
     merging_free(&m->charting[i].merging);
-    VSHI_TRY(vshi_allocate((void **)&shape->boxes, shape->patches.count, sizeof *shape->boxes, what, error));
     for (size_t c = 0; c < shape->patches.count; ++c) {
-        VSHI_TRY(vshi_patch_straighten(&shape->patches.list[c], &shape->boxes[c], error));
+        VSHI_TRY(vshi_patch_straighten(&shape->patches.list[c], error));
     }
     vshi_job_advance(m->job, shape->mesh->triangle_count);
     return VSH_OK;
@@ -659,7 +641,6 @@ vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_unwrap_options *op
 done:
     for (size_t i = 0; i < shapes->count; ++i) {
         merging_free(&m.charting[i].merging);
-        free(m.charting[i].triangles);
         free(m.charting[i].begin);
     }
     free(m.charting);

@@ -1,11 +1,11 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "mesh/mesh.h"
-#include "unwrap/pack.h"
+#include "unwrap/charts.h"
 
 #include <stdlib.h>
 
-static const double LEAST_STRETCH = 1.01; /* of max_stretch: below, rounding and texels decide */
+static const double LEAST_STRETCH = 1.01; /* for max_stretch: below, rounding and texels decide */
 
 enum { MOST_PADDING = 4096 };
 
@@ -65,11 +65,11 @@ static vsh_result check_meshes(const vsh_mesh *meshes, size_t mesh_count, vsh_er
 static vsh_result check_memory(const vsh_mesh *meshes, size_t mesh_count, const vshi_shapes *shapes,
                                const vsh_unwrap_options *options, const vsh_run *run, vsh_error *error) {
     double bytes = (double)mesh_count * 384.0;
-    for (size_t i = 0; i < shapes->count; ++i) { /* with a shape's part of the atlas */
+    for (size_t i = 0; i < shapes->count; ++i) { /* including a shape's part of the atlas */
         const vsh_mesh *mesh = shapes->list[i].mesh;
         bytes += vshi_cut_mesh_bytes(mesh) + 64.0 * (double)mesh->triangle_count;
     }
-    for (size_t m = 0; m < mesh_count; ++m) { /* and those of its instances */
+    for (size_t m = 0; m < mesh_count; ++m) { /* and the parts of its instances */
         bytes += 28.0 * (double)meshes[m].triangle_count;
     }
     const vshi_packing packing = {.width = options->width, .height = options->height};
@@ -77,7 +77,7 @@ static vsh_result check_memory(const vsh_mesh *meshes, size_t mesh_count, const 
 }
 
 static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const double *density,
-                             vshi_item **items, size_t *count, vsh_error *error) {
+                             vshi_pack_item **items, size_t *count, vsh_error *error) {
     *count = 0;
     for (size_t m = 0; m < mesh_count; ++m) {
         *count += shapes->list[shapes->instances[m].shape].patches.count;
@@ -90,59 +90,58 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
         return vshi_fail(error, VSH_ERROR_LIMIT, "unwrap: %zu charts, at most %u", *count, VSH_NO_CHART - 1);
     }
     VSHI_TRY(vshi_allocate((void **)items, *count, sizeof **items, "packing charts", error));
-    vshi_item *item = *items;
+    vshi_pack_item *item = *items;
     for (size_t m = 0; m < mesh_count; ++m) {
         const vshi_shape *shape = &shapes->list[shapes->instances[m].shape];
         const double factor =
             shape->surface.scale * shapes->instances[m].scale * (density != NULL ? density[m] : 1.0);
         for (size_t c = 0; c < shape->patches.count; ++c) {
-            *item++ = (vshi_item){.patch = &shape->patches.list[c],
-                                  .boxes = &shape->boxes[c],
-                                  .factor = factor,
-                                  .mesh = (uint32_t)m};
+            *item++ =
+                (vshi_pack_item){.patch = &shape->patches.list[c], .factor = factor, .mesh = (uint32_t)m};
         }
     }
     return VSH_OK;
 }
 
-/* --- pages: all charts go onto pages together, or the charts of each object onto a page of their own. Then
- * pages are made as small as their charts allow. */
+/* --- pages: all charts are packed together, or those of each object onto a page of its own. Then pages
+ * shrink as far as their charts allow. */
 
-/* Of factors of two objects' charts that are packed alike: scales of instances are roots of sums. */
+/* Relative difference of the factors of charts that are packed alike: scales of instances are roots of sums.
+ */
 static const double SAME_FACTOR = 1e-9;
 
-/* Share of a page's texels that charts may touch for it to be tried: beside them is padding. */
+/* Most share of a page's texels that charts may touch for it to be tried: the rest is padding. */
 static const double MOST_TOUCHED = 0.98;
 
 enum {
     UNITS = 1024,  /* of the job, for each group */
-    LEAST_SIDE = 4 /* texels of a page that is made to fit: blocks of compressed textures are as large */
+    LEAST_SIDE = 4 /* texels of a shrunk page: as large as blocks of compressed textures */
 };
 
 /* Items that are packed together. */
 typedef struct group {
     size_t first, count; /* items */
     size_t mesh;         /* the first of its object */
-    size_t before;       /* the last group before whose first mesh is of the same shape, + 1; 0: none */
-    size_t alike;        /* an earlier group that it is packed as, + 1; 0: none */
+    size_t before;       /* 1 + the last earlier group whose first mesh is of the same shape; 0: none */
+    size_t alike;        /* 1 + an earlier group with the same packing; 0: none */
     size_t page, pages;  /* its first page, and how many */
 } group;
 
 typedef struct work {
     const vsh_unwrap_options *options;
     const vshi_shapes *shapes;
-    vshi_item *items;
+    vshi_pack_item *items;
     size_t item_count;
-    vshi_item *own; /* [item_count]: those of a page that is made to fit */
-    group *groups;  /* [group_count] */
+    group *groups; /* [group_count]; one block with `own` and `latest` */
     size_t group_count;
-    size_t *latest; /* [shape count]: the last group whose first mesh is of a shape, + 1; 0: none */
+    vshi_pack_item *own; /* [item_count]: items of a page that shrinks */
+    size_t *latest;      /* [shape count]: 1 + the last group whose first mesh is of the shape; 0: none */
     vshi_job *job;
     vshi_pages *pages;
     size_t room; /* of the pages' list */
 } work;
 
-static vshi_packing packing_of(const vsh_unwrap_options *o) {
+static vshi_packing make_packing(const vsh_unwrap_options *o) {
     return (vshi_packing){.width = o->width,
                           .height = o->height,
                           .padding = o->padding,
@@ -157,10 +156,9 @@ static bool same_factor(double a, double b) {
     return fabs(a - b) <= SAME_FACTOR * b;
 }
 
-/* Whether two groups have the same charts up to one scale factor. With a given density the factor must be
- * 1. */
+/* Whether two groups have the same charts up to one scale factor, which must be 1 with a given density. */
 static bool are_alike(const work *w, const group *a, const group *b) {
-    const vshi_item *x = w->items + a->first, *y = w->items + b->first;
+    const vshi_pack_item *x = w->items + a->first, *y = w->items + b->first;
     const double by = w->options->texels_per_unit > 0.0 ? 1.0 : x[0].factor / y[0].factor;
     bool alike = a->count == b->count;
     for (size_t i = 0; i < a->count && alike; ++i) {
@@ -213,8 +211,8 @@ static vsh_result add_pages(work *w, group *g, const vshi_packing *packing, vsh_
     return VSH_OK;
 }
 
-static vsh_result pack(work *w, group *g, vsh_error *error) {
-    vshi_packing packing = packing_of(w->options);
+static vsh_result pack_group(work *w, group *g, vsh_error *error) {
+    vshi_packing packing = make_packing(w->options);
     vsh_error why;
     const vsh_result result = vshi_pack(&packing, w->items + g->first, g->count, w->job, UNITS, &why);
     if (result == VSH_OK) {
@@ -243,7 +241,7 @@ static vsh_result pack_alike(work *w, group *g, vsh_error *error) {
                                            : add_pages(w, g, &packing, error);
 }
 
-/* --- pages that fit */
+/* --- pages that shrink */
 
 typedef struct page_size {
     int32_t width, height;
@@ -255,7 +253,7 @@ static int compare_sizes(const void *a, const void *b) {
     return s != t ? (s > t) - (s < t) : (x->height > y->height) - (x->height < y->height);
 }
 
-/* Powers of two below a side, and the side itself. */
+/* Powers of two below a side, then the side itself. */
 static int list_sides(int32_t most, int32_t sides[32]) {
     int count = 0;
     for (int32_t side = LEAST_SIDE; side < most; side *= 2) {
@@ -267,8 +265,8 @@ static int list_sides(int32_t most, int32_t sides[32]) {
 
 enum { MOST_SIZES = 256 };
 
-/* Sizes of pages below the largest, by their texels: sides at most twice as long as each other, or that of
- * the largest page. */
+/* Sizes of pages below the largest, by their texels. One side is at most twice the other, or that of the
+ * largest page. */
 static int list_sizes(const vsh_unwrap_options *o, page_size sizes[MOST_SIZES]) {
     int32_t widths[32], heights[32];
     const int columns = list_sides(o->width, widths), rows = list_sides(o->height, heights);
@@ -286,9 +284,9 @@ static int list_sizes(const vsh_unwrap_options *o, page_size sizes[MOST_SIZES]) 
     return count;
 }
 
-/* Packs what lies on a page into the smallest in which it has room. */
-static vsh_result fit_page(work *w, const group *g, size_t number, vsh_error *error) {
-    vshi_item *own = w->own;
+/* Packs the items of a page into the smallest page with room for them. */
+static vsh_result shrink_page(work *w, const group *g, size_t number, vsh_error *error) {
+    vshi_pack_item *own = w->own;
     vsh_atlas_page *page = &w->pages->list[number];
     page_size sizes[MOST_SIZES];
     const int size_count = list_sizes(w->options, sizes);
@@ -302,7 +300,7 @@ static vsh_result fit_page(work *w, const group *g, size_t number, vsh_error *er
     }
     bool fits = false;
     for (int s = 0; s < size_count && !fits; ++s) {
-        vshi_packing packing = packing_of(w->options);
+        vshi_packing packing = make_packing(w->options);
         packing.width = sizes[s].width;
         packing.height = sizes[s].height;
         packing.max_pages = 1;
@@ -331,27 +329,28 @@ static vsh_result pack_groups(work *w, vsh_error *error) {
             VSHI_TRY(pack_alike(w, g, error));
             continue;
         }
-        VSHI_TRY(pack(w, g, error));
+        VSHI_TRY(pack_group(w, g, error));
         for (size_t page = g->page; page < g->page + g->pages && w->options->fit_pages != 0; ++page) {
-            VSHI_TRY(fit_page(w, g, page, error));
+            VSHI_TRY(shrink_page(w, g, page, error));
         }
     }
     return VSH_OK;
 }
 
-/* Gives each item its place, as the options have it: items are those of the meshes in their order, which are
- * instances of shapes. The stage is "pack". */
-static vsh_result pack_pages(const vsh_unwrap_options *options, const vshi_shapes *shapes, vshi_item *items,
-                             size_t item_count, const vsh_run *run, vshi_pages *pages, vsh_error *error) {
+/* Gives each item its place, by the options. Items are in the order of their meshes. The stage is "pack". */
+static vsh_result pack_pages(const vsh_unwrap_options *options, const vshi_shapes *shapes,
+                             vshi_pack_item *items, size_t item_count, const vsh_run *run, vshi_pages *pages,
+                             vsh_error *error) {
     const size_t mesh_count = shapes->mesh_count;
     work w = {.options = options, .shapes = shapes, .items = items, .item_count = item_count, .pages = pages};
-    const vshi_packing packing = packing_of(options);
-    const vshi_array arrays[] = {VSHI_ARRAY(w.own, options->fit_pages != 0 ? item_count : 0),
-                                 VSHI_ARRAY(w.groups, mesh_count), VSHI_ARRAY(w.latest, shapes->count)};
+    const vshi_packing packing = make_packing(options);
+    const vshi_array arrays[] = {VSHI_ARRAY(w.groups, mesh_count),
+                                 VSHI_ARRAY(w.own, options->fit_pages != 0 ? item_count : 0),
+                                 VSHI_ARRAY(w.latest, shapes->count)};
     vsh_result result;
     *pages = (vshi_pages){NULL, 0};
     VSHI_TRY_DONE(vshi_check_limit(run, vshi_pack_bytes(&packing, item_count), "packing charts", error));
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "pages of an atlas", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, "pages of an atlas", error));
     if (options->atlas == VSH_ATLAS_OBJECTS) {
         find_objects(&w);
     } else {
@@ -365,8 +364,6 @@ static vsh_result pack_pages(const vsh_unwrap_options *options, const vshi_shape
     result = pack_groups(&w, error);
 done:
     vshi_job_end(w.job);
-    free(w.own);
-    free(w.latest);
     free(w.groups);
     return result;
 }
@@ -386,7 +383,7 @@ vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwra
     VSHI_TRY(check_options(&o, mesh_count, error));
     VSHI_TRY(check_meshes(meshes, mesh_count, error));
     vshi_shapes shapes = {0};
-    vshi_item *items = NULL;
+    vshi_pack_item *items = NULL;
     size_t count = 0;
     vshi_pages pages = {NULL, 0};
     vsh_result result;

@@ -1,11 +1,11 @@
-/* UVs that meshes have: charts of them, and how dense and how stretched they are. */
+/* A mesh's own UVs: whether they can serve as charts, how dense and how stretched they are. */
 #include "base/floats.h"
 #include "base/memory.h"
-#include "mesh/weld.h"
-#include "unwrap/patch.h"
+#include "mesh/edges.h"
+#include "unwrap/charts.h"
 
 #include <stdlib.h>
-#include <vdbshade/unwrap.h>
+#include <vdbshade/lightmap.h>
 
 static const char what[] = "charts of UVs";
 
@@ -20,7 +20,7 @@ static bool in_square(const float *uvs, const uint32_t *corner) {
 }
 
 /* 1: the triangle runs anticlockwise, -1: clockwise, 0: it has no area. */
-static int sense(const float *uvs, const uint32_t *corner) {
+static int find_sense(const float *uvs, const uint32_t *corner) {
     const float *a = uvs + 2 * (size_t)corner[0], *b = uvs + 2 * (size_t)corner[1],
                 *c = uvs + 2 * (size_t)corner[2];
     const double area = ((double)b[0] - (double)a[0]) * ((double)c[1] - (double)a[1]) -
@@ -28,8 +28,8 @@ static int sense(const float *uvs, const uint32_t *corner) {
     return area > 0.0 ? 1 : area < 0.0 ? -1 : 0;
 }
 
-/* Fills a patch's uv; where all run clockwise, mirrored. */
-static void take_uvs(vshi_patch *p, bool mirrored, double scale) {
+/* Copies the mesh's UVs into a patch; mirrored if its triangles run clockwise. */
+static void copy_uvs(vshi_patch *p, bool mirrored, double scale) {
     const vsh_mesh *mesh = p->surface->mesh;
     for (uint32_t i = 0; i < p->count; ++i) {
         for (uint32_t k = 0; k < 3; ++k) {
@@ -41,7 +41,7 @@ static void take_uvs(vshi_patch *p, bool mirrored, double scale) {
     }
 }
 
-static double flat_area(const vshi_patch *p) {
+static double sum_flat_areas(const vshi_patch *p) {
     double sum = 0.0;
     for (uint32_t i = 0; i < p->count; ++i) {
         sum += 0.5 * vshi_patch_doubled_area(p, i);
@@ -49,7 +49,7 @@ static double flat_area(const vshi_patch *p) {
     return sum;
 }
 
-/* Numbers the parts of a patch that hang together, by their first triangles: part[count]. */
+/* Numbers the connected parts of a patch in the order of their first triangles: part[count]. */
 static uint32_t find_parts(const vshi_patch *p, uint32_t *part) {
     uint32_t parts = 0;
     for (uint32_t i = 0; i < p->count; ++i) {
@@ -63,7 +63,7 @@ static uint32_t find_parts(const vshi_patch *p, uint32_t *part) {
     for (uint32_t i = 0; i < p->count; ++i) {
         part[i] = vshi_set_of(part, i);
     }
-    for (uint32_t i = 0; i < p->count; ++i) { /* the first of a part stands before the others */
+    for (uint32_t i = 0; i < p->count; ++i) { /* a root stands before the others of its part */
         part[i] = part[i] == i ? parts++ : part[part[i]];
     }
     return parts;
@@ -73,16 +73,16 @@ static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches
     uint32_t *part = NULL;
     vshi_patches parts = {0};
     vshi_patch patch = {0};
-    const double scale = sqrt(whole->area / flat_area(whole));
+    const double scale = sqrt(whole->area / sum_flat_areas(whole));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&part, whole->count, sizeof *part, what, error));
     VSHI_TRY_DONE(vshi_patches_split(whole, part, find_parts(whole, part), &parts, error));
     while (parts.count > 0) {
         const vshi_patch next = parts.list[--parts.count];
         VSHI_TRY_DONE(vshi_patch_make(whole->surface, next.triangles, next.count, &patch, error));
-        take_uvs(&patch, mirrored, 1.0);
-        vshi_flatten_measure(&patch); /* its stretch, which its size is no part of */
-        take_uvs(&patch, mirrored, scale);
+        copy_uvs(&patch, mirrored, 1.0);
+        vshi_flatten_measure(&patch); /* for the stretch: it also changes the size */
+        copy_uvs(&patch, mirrored, scale);
         patch.kept = true;
         VSHI_TRY_DONE(vshi_patches_add(patches, &patch, error));
     }
@@ -102,7 +102,7 @@ vsh_result vshi_keep_charts(const vshi_cut_mesh *s, vshi_patches *patches, bool 
         if (s->area[i] == 0.0) {
             continue;
         }
-        const int own = sense(mesh->uvs, mesh->indices + 3 * (size_t)i);
+        const int own = find_sense(mesh->uvs, mesh->indices + 3 * (size_t)i);
         if (!in_square(mesh->uvs, mesh->indices + 3 * (size_t)i) || own == 0 ||
             (count > 0 && own != senses)) {
             return VSH_OK;
@@ -125,8 +125,8 @@ vsh_result vshi_keep_charts(const vshi_cut_mesh *s, vshi_patches *patches, bool 
     }
     vsh_result result;
     VSHI_TRY_DONE(vshi_patch_make(s, triangles, count, &whole, error));
-    take_uvs(&whole, senses < 0, 1.0);
-    whole.kept = true; /* of many parts, each with a border of its own */
+    copy_uvs(&whole, senses < 0, 1.0);
+    whole.kept = true; /* it has many parts, each with a border of its own */
     VSHI_TRY_DONE(vshi_patch_overlaps(&whole, &overlaps, error));
     *usable = !overlaps;
     if (*usable && patches != NULL) {
@@ -134,29 +134,6 @@ vsh_result vshi_keep_charts(const vshi_cut_mesh *s, vshi_patches *patches, bool 
     }
 done:
     vshi_patch_free(&whole);
-    return result;
-}
-
-vsh_result vsh_uvs_usable(const vsh_mesh *mesh, const vsh_run *run, int32_t *usable, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(mesh);
-    VSHI_NEEDS(usable);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error));
-    VSHI_TRY(vshi_check_limit(&full, vshi_cut_mesh_bytes(mesh), "looking at UVs", error));
-    vshi_cut_mesh surface;
-    bool found = false;
-    vsh_result result = VSH_OK;
-    *usable = 0;
-    if (mesh->uvs == NULL) {
-        return VSH_OK;
-    }
-    VSHI_TRY_DONE(vshi_cut_mesh_make(mesh, VSHI_MESH_ALONE, true, &surface, error));
-    VSHI_TRY_DONE(vshi_keep_charts(&surface, NULL, &found, error));
-    *usable = found;
-done:
-    vshi_cut_mesh_free(&surface);
     return result;
 }
 
@@ -170,7 +147,7 @@ typedef struct sums {
 } sums;
 
 /* Squared L2 stretch of a triangle (Sander and others, "Texture mapping progressive meshes", 2001): half the
- * sum of the squared lengths on the surface of a unit along u and of one along v. */
+ * sum of the squared lengths on the surface of unit steps along u and v. */
 static double square_stretch(const vshi_vec p[3], const double uv[3][2], double doubled) {
     vshi_vec along[2];
     for (int k = 0; k < 2; ++k) { /* derivatives by texel */

@@ -1,38 +1,36 @@
-/* A scene in a page: the surface of its casters' voxels, with light at the vertices. */
+/* The page of a scene: the surface of its casters' voxels, with light at the vertices. */
 #include "base/floats.h"
 #include "base/memory.h"
 #include "field/field.h"
-#include "field/surface.h"
 #include "model/model.h"
 #include "shade/occluders.h"
 #include "view/page.h"
 
 #include <math.h>
 #include <stdlib.h>
-#include <vdbshade/query.h>
-#include <vdbshade/shade.h>
+#include <vdbshade/light.h>
 
-/* Texels of a row of the image of values, which any WebGL 2 holds. */
+/* Texels of a row of the image of values: WebGL 2 holds that many. */
 enum { WIDTH = 2048, LIGHT_CHANNELS = 3 };
 
-/* Points are shaded so far off the surface that its own voxels do not hide them, voxels. */
+/* Distance of shaded points from the surface, voxels: beyond the surface's own voxels. */
 static const double LIFT = 0.5;
 
-/* The even light of the sky where a scene names none: beside its lights, and without any. */
+/* Even light of the sky for scenes without ambient light: with lights, and without any. */
 static const double DIM_SKY = 0.3, ONLY_SKY = 1.0;
 
-/* Points beyond which a field's own surface is worth its extraction for the rays of AO. */
+/* Points for which extracting the field's surface pays for AO rays. */
 static const double MANY_POINTS = 1e6;
 
 typedef struct surface {
     const char *path;
     const vsh_scene *scene;
     const vsh_run *run;
-    vshi_model_shape shape; /* positions relative to `middle` */
-    double *points;         /* [vertex_count][3]: where the vertices are shaded, world units */
+    vshi_model_shape shape; /* positions relative to `middle`; its arrays and `points` are one block */
+    double *points;         /* [vertex_count][3]: shaded points, world units */
     double middle[3];       /* world space */
+    float **planes;         /* [channel_count]; one block with the two arrays below */
     float *light;           /* [vertex_count][3]: irradiance */
-    float **planes;         /* [channel_count] */
     char (*names)[VSH_CHANNEL_NAME];
     int32_t channel_count;
     int32_t height; /* of the image of values */
@@ -69,7 +67,7 @@ static void add_vertices(surface *s, const part *p, size_t first) {
     }
 }
 
-/* Two triangles for each quad. The page shows both of their sides, as quads go around either way. */
+/* Adds two triangles for each quad. Quads run either way round, so the page shows both sides. */
 static void add_triangles(surface *s, const part *p, uint32_t first) {
     for (size_t q = 0; q < p->quads.quad_count; ++q) {
         static const int corners[] = {0, 1, 2, 0, 2, 3};
@@ -90,11 +88,11 @@ static vsh_result allocate_mesh(surface *s, double quads, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %g vertices, at most %u; use larger voxels", s->path,
                          vertices, UINT32_MAX);
     }
-    const size_t count = s->shape.vertex_count;
-    VSHI_TRY(vshi_allocate((void **)&s->shape.positions, count, 3 * sizeof(float), s->path, error));
-    VSHI_TRY(vshi_allocate((void **)&s->shape.normals, count, 3 * sizeof(float), s->path, error));
-    VSHI_TRY(vshi_allocate((void **)&s->points, count, 3 * sizeof(double), s->path, error));
-    return vshi_allocate((void **)&s->shape.indices, (size_t)quads, 6 * sizeof(uint32_t), s->path, error);
+    const size_t count = 3 * s->shape.vertex_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(s->shape.positions, count), VSHI_ARRAY(s->shape.normals, count),
+                                 VSHI_ARRAY(s->points, count),
+                                 VSHI_ARRAY(s->shape.indices, 6 * (size_t)quads)};
+    return VSHI_ALLOCATE_BLOCK(arrays, s->path, error);
 }
 
 static vsh_result join_parts(surface *s, const part *parts, size_t count, vsh_error *error) {
@@ -111,7 +109,7 @@ static vsh_result join_parts(surface *s, const part *parts, size_t count, vsh_er
     return VSH_OK;
 }
 
-/* The surfaces of the field and of each layer's, as one mesh. */
+/* Joins the surfaces of the field and of each layer's field in one mesh. */
 static vsh_result make_mesh(surface *s, const vsh_occluders *occluders, vsh_error *error) {
     part *parts = NULL;
     const size_t count = 1 + occluders->layer_count;
@@ -141,10 +139,12 @@ static vsh_result allocate_values(surface *s, vsh_error *error) {
     s->height = (int32_t)((s->shape.vertex_count + WIDTH - 1) / WIDTH);
     const double texels = (double)texel_count(s);
     VSHI_TRY(vshi_check_limit(s->run, 4.0 * texels * (double)(count + LIGHT_CHANNELS), s->path, error));
-    VSHI_TRY(vshi_allocate((void **)&s->planes, count, sizeof *s->planes, s->path, error));
-    VSHI_TRY(vshi_allocate((void **)&s->names, count, sizeof *s->names, s->path, error));
-    VSHI_TRY(vshi_allocate((void **)&s->light, s->shape.vertex_count, LIGHT_CHANNELS * sizeof *s->light,
-                           s->path, error));
+    float *values;
+    const vshi_array arrays[] = {VSHI_ARRAY(s->planes, count),
+                                 VSHI_ARRAY(s->light, LIGHT_CHANNELS * s->shape.vertex_count),
+                                 VSHI_ARRAY(s->names, count), VSHI_ARRAY(values, count * texel_count(s))};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, s->path, error));
+    s->channel_count = (int32_t)count;
     for (size_t i = 0; i < count; ++i) {
         const size_t rest = i - lights - (s->scene->ao != 0);
         if (i < lights) {
@@ -154,8 +154,7 @@ static vsh_result allocate_values(surface *s, vsh_error *error) {
         } else {
             snprintf(s->names[i], sizeof s->names[i], "irradiance.%c", "RGB"[rest]);
         }
-        VSHI_TRY(vshi_allocate((void **)&s->planes[i], texel_count(s), sizeof *s->planes[i], s->path, error));
-        ++s->channel_count;
+        s->planes[i] = values + i * texel_count(s);
     }
     return VSH_OK;
 }
@@ -167,7 +166,7 @@ static vsh_points points_of(const surface *s) {
 static vsh_result shade(surface *s, const vsh_occluders *occluders, vsh_error *error) {
     vsh_shade_options options = s->scene->shade;
     if (s->scene->ao == 0) {
-        options.ao_method = VSH_AO_AUTO; /* no rays are cast: exact may lack its triangles */
+        options.ao_method = VSH_AO_AUTO; /* unused, but exact would need triangles */
     }
     vsh_query *query = NULL;
     VSHI_TRY(vsh_query_create(occluders, s->scene->lights, s->scene->light_count, &options, &query, error));
@@ -181,7 +180,7 @@ static vsh_result shade(surface *s, const vsh_occluders *occluders, vsh_error *e
     return result;
 }
 
-/* Adds up what vsh_view_write_scene() calls light. */
+/* Sums up the light of the sky and of the lights. */
 static void add_light(surface *s) {
     const vsh_scene *scene = s->scene;
     const size_t lights = scene->light_count;
@@ -222,19 +221,6 @@ static vsh_result write(surface *s, const char *name, vsh_error *error) {
                              .planes = (const float *const *)s->planes};
     const vshi_view_surface seen = {name, &model, &image};
     return vshi_view_write_page(s->path, NULL, 0, &seen, s->run, error);
-}
-
-static void free_surface(surface *s) {
-    for (int32_t i = 0; i < s->channel_count; ++i) {
-        free(s->planes[i]);
-    }
-    free(s->planes);
-    free(s->names);
-    free(s->light);
-    free(s->points);
-    free(s->shape.positions);
-    free(s->shape.normals);
-    free(s->shape.indices);
 }
 
 static vsh_result show(surface *s, const char *name, const vsh_occluders *occluders, vsh_error *error) {
@@ -283,7 +269,8 @@ vsh_result vsh_view_write_scene(const char *path, const char *name, const vsh_sc
     VSHI_TRY_DONE(vsh_scene_occluders(&voxelised, assets, &what, &full, &occluders, error));
     result = show(&s, name, occluders, error);
 done:
-    free_surface(&s);
+    free(s.planes);
+    free(s.shape.positions);
     vsh_occluders_free(occluders);
     vsh_assets_free(assets);
     free(casters);

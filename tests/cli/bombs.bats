@@ -6,7 +6,7 @@ within() {
     local most=$1
     shift
     unless_sanitized "its shadow memory does not fit"
-    run --separate-stderr bash -c 'ulimit -d "$1"; shift; exec "$@"' bash $((most * 1000)) "$VDBSHADE" "$@" --threads 1
+    limited "-d $((most * 1000))" "$@" --threads 1
 }
 
 @test "a reader holds an image's pixels against the limit before it reads them" {

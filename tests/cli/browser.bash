@@ -17,8 +17,8 @@ picture() {
 # The size of the window for browser.py, an even number.
 WIDE=400
 
-# look PAGE STATE [ACTION …] [-- OPTION …]: opens PAGE#STATE and does what browser.py can do; its picture is in page.png, its
-# document in page.dom.
+# look PAGE STATE [ACTION …] [-- OPTION …]: opens PAGE#STATE and does what browser.py can do. Its picture is in page.png, its
+# document in page.dom, whose state is $ENDS.
 look() {
     local page=$1 state=$2
     shift 2
@@ -26,11 +26,15 @@ look() {
     [[ " $* " == *" -- "* ]] || words+=(--)
     timeout 200 python3 "$BATS_TEST_DIRNAME/browser.py" "file://$PWD/$page#$state" $WIDE page.png page.dom "${words[@]}" \
         --user-data-dir="$BATS_FILE_TMPDIR/profile" 2>page.log || fail "$(tail -5 page.log)"
+    page_has "data-state=\"${ENDS:-ready}\""
 }
 
-# state_is WORD: what the page says of itself.
-state_is() {
-    grep -q "data-state=\"$1\"" page.dom || fail "no $1: $(grep -o '<div id="message".*' page.dom)"
+# page_has TEXT …: the document of the last page has them.
+page_has() {
+    local text
+    for text; do
+        grep -qF -- "$text" page.dom || fail "no $text: $(grep -oE '(<div id="message"|<section|id="problems"|id="legend").*' page.dom)"
+    done
 }
 
 # pixel_is X Y R G B: a pixel of the last picture, to one of 255.

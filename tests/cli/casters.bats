@@ -1,9 +1,11 @@
-# Casters without voxels, from scene files: terrains and spheres. What is wrong with their files is told by its place.
+# Casters of scene files: terrains and spheres without voxels, images, text and level sets. What is wrong with their files is told by
+# its place.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
+prepare() {
     ln -s "$(cd "$ASSETS" && pwd)"/{terrain.png,spheres.csv,seeds_floor.obj} .
+    cp "$ASSETS/emblem.png" .
+    old_output out.vdb
 }
 
 SUN='"lights": [{"name": "sun", "type": "directional", "direction": [-0.7, 0.4, 0.3], "angle_deg": 4}]'
@@ -107,7 +109,7 @@ write_hill() {
 2 'terrain.png' 'give --size-world W, the length of its longer side' | terrain.png --height 2 --ao 1 -o out.exr
 2 'terrain.png' 'give --height H, the height of white' | terrain.png --size-world 10 --ao 1 -o out.exr
 2 "--height '0'" | terrain.png --height 0 --size-world 10 --ao 1 -o out.exr
-2 "--size-world '0'" | terrain.png --height 2 --size-world 10,0 --ao 1 -o out.exr
+2 "--size-world '10,0'" | terrain.png --height 2 --size-world 10,0 --ao 1 -o out.exr
 2 '--height' 'seeds_floor.obj is no image of heights' | seeds_floor.obj --height 2 --ao 1 -o out.exr
 LIST
     printf '{%s, "receivers": []}' "$SUN" >scene.json
@@ -124,8 +126,7 @@ LIST
 
 @test "info tells of terrains and spheres" {
     scene "{$LAND, \"direct\": true}, {\"spheres\": \"spheres.csv\"}, {\"spheres\": [[0, 0, 0, 1]], \"voxelised\": true}" "$OVER"
-    succeed info scene.json
-    [[ $output == *"heightfield"*"terrain.png"* ]]
+    succeed_printing "heightfield" "terrain.png" -- info scene.json
     [[ $output == *"spheres"*"spheres.csv"* ]]
     [[ $output == *"caster 2: spheres"* ]]
 }
@@ -164,4 +165,167 @@ LIST
 @test "trade refuses casters without voxels" {
     scene '{"spheres": "spheres.csv"}' "$FLOOR"
     refuses 2 "not part of it" -- trade scene.json -o report.html
+}
+
+# same_distances A.json B.json TOLERANCE: at points all over [-2, 2]³, within 0.1 of the surface. Farther off, where the field has coarser voxels,
+# within a tenth.
+same_distances() {
+    awk -v OFS=, 'BEGIN { srand(7); for (i = 0; i < 4000; ++i) print 4 * rand() - 2, 4 * rand() - 2, 4 * rand() - 2 }' >points.csv
+    local scene
+    for scene in "$1" "$2"; do
+        "$VDBSHADE" query "$scene" --points points.csv -o "$scene.csv" --distance --answers-only --quiet
+    done
+    paste -d, "$1.csv" "$2.csv" | awk -F, -v tolerance="$3" '
+        $1 + 0 == $1 && $2 + 0 == $2 { ++n; d = $1 - $2; if (d < 0) d = -d; if (d > worst) worst = d }
+        $1 < 0.1 && $1 > -0.1 { ++beside; if (d > near) near = d }
+        END { printf "%d points, at most %g apart; %d near, %g\n", n, worst, beside, near
+              exit !(n > 3000 && worst < 0.1 && beside > 8 && near < tolerance) }'
+}
+
+@test "a mask is the solid that its picture shows" {
+    # the ring of the emblem: 36 … 44 of 96 pixels, scaled to a picture of 3.84 units; the star left out by a cylinder
+    cat >mask.json <<'JSON'
+{"casters": [{"mask": "emblem.png", "size": 3.84, "thickness": 0.5},
+             {"sdf": {"shape": "cylinder", "half_height": 0.25, "radius": 1.3, "rotate_deg": [90, 0, 0]}}],
+ "voxel_size": 0.03}
+JSON
+    cat >ring.json <<'JSON'
+{"casters": [{"sdf": {"op": "union", "of": [
+    {"op": "subtraction", "of": [{"shape": "cylinder", "half_height": 0.25, "radius": 1.76},
+                                 {"shape": "cylinder", "half_height": 1, "radius": 1.44}]},
+    {"shape": "cylinder", "half_height": 0.25, "radius": 1.3}], "rotate_deg": [90, 0, 0]}}],
+ "voxel_size": 0.03}
+JSON
+    same_distances mask.json ring.json 0.012
+}
+
+@test "an inverted mask of another channel and a transform" {
+    # the whole picture is white in its colours: below a threshold of 2 everything
+    cat >mask.json <<'JSON'
+{"casters": [{"mask": "emblem.png", "size": [2, 1], "thickness": 0.4, "channel": "luminance", "threshold": 2,
+              "invert": true, "transform": {"rotate_deg": [0, 0, 90], "scale": 1.5, "translate": [0.2, 0, 0]}}],
+ "voxel_size": 0.04}
+JSON
+    cat >box.json <<'JSON'
+{"casters": [{"sdf": {"shape": "box", "half_size": [0.75, 1.5, 0.3], "translate": [0.2, 0, 0]}}], "voxel_size": 0.04}
+JSON
+    same_distances mask.json box.json 0.001
+}
+
+@test "text is the solid of its letters" {
+    # l of DejaVu Sans is a bar from 193 to 377 of 2048 units, 1556 high
+    cat >text.json <<JSON
+{"casters": [{"text": "l", "font": "$FONT", "height": 2.048, "thickness": 0.3,
+              "transform": {"translate": [-0.285, -0.778, 0]}}], "voxel_size": 0.02}
+JSON
+    cat >bar.json <<'JSON'
+{"casters": [{"sdf": {"shape": "box", "half_size": [0.092, 0.778, 0.15]}}], "voxel_size": 0.02}
+JSON
+    same_distances text.json bar.json 0.001
+}
+
+@test "masks and text cast in a bake" {
+    cat >scene.json <<JSON
+{"casters": [{"text": "vdb", "font": "$FONT", "height": 1.5, "align": "center", "thickness": 0.3,
+              "transform": {"rotate_deg": [90, 0, 0], "translate": [0, 1, 0]}},
+             {"mask": "emblem.png", "size": 1, "thickness": 0.2, "transform": {"translate": [0, 0.5, -1]}}],
+ "voxel_size": 0.04, "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0.2], "angle_deg": 5}],
+ "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 64, "output": "one.exr"}]}
+JSON
+    succeed bake scene.json --threads 1 --quiet
+    sed -i 's/one.exr/two.exr/' scene.json
+    succeed bake scene.json --threads 7 --quiet
+    same_values one.exr two.exr
+    succeed_printing "caster 0: text $FONT" "caster 1: mask emblem.png" -- info scene.json
+    succeed_printing "channel 'shadow.sun': min 0, " "max 1" -- info one.exr
+}
+
+# refuses_caster CODE CASTER WORD …
+refuses_caster() {
+    printf '{"casters": [%s], "voxel_size": 0.05}' "$2" >bad.json
+    refuses "$1" "${@:3}" -- voxelize bad.json -o out.vdb
+}
+
+@test "masks that are no masks, and text that is no text" {
+    mkdir folder.png
+    head -c 300 emblem.png >cut.png
+    head -c 30000 "$FONT" >cut.ttf
+    local code words caster
+    while IFS='|' read -r code words caster; do
+        eval "words=($words)"
+        refuses_caster "$code" "$caster, \"thickness\": 1}" "${words[@]}"
+    done <<LIST
+3|none.png|{"mask": "none.png", "size": 1
+2|emblem.png 'no outline'|{"mask": "emblem.png", "size": 1, "threshold": 1.5
+2|emblem.png "no channel 'depth'"|{"mask": "emblem.png", "size": 1, "channel": "depth"
+2|bad.json|{"mask": "bad.json", "size": 1
+3|cut.png|{"mask": "cut.png", "size": 1
+3|folder.png|{"mask": "folder.png", "size": 1
+3|none.ttf|{"text": "a", "font": "none.ttf", "height": 1
+2|emblem.png 'no font'|{"text": "a", "font": "emblem.png", "height": 1
+2|U+5B57|{"text": "a字", "font": "$FONT", "height": 1
+2|'no outline'|{"text": "  ", "font": "$FONT", "height": 1
+2|U+0009|{"text": "a\\tb", "font": "$FONT", "height": 1
+4|1048576|{"text": "$(head -c 1100000 /dev/zero | tr '\0' o)", "font": "$FONT", "height": 1
+2|cut.ttf|{"text": "a", "font": "cut.ttf", "height": 1
+LIST
+    printf '{"casters": [{"mask": "emblem.png", "size": 1, "thickness": 1}]}' >large.json
+    refuses 4 -- voxelize large.json -o out.vdb --voxel-size 0.0001 --memory-limit 64MiB
+    untouched out.vdb
+}
+
+@test "exact traces the surface of a mask's voxels" {
+    cat >scene.json <<JSON
+{"casters": [{"mask": "emblem.png", "size": 1, "thickness": 0.2}], "voxel_size": 0.05, "method": "exact",
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}],
+ "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 16, "output": "o.exr"}]}
+JSON
+    succeed_saying "shadow exact" -- bake scene.json
+}
+
+solid() {
+    printf '{"casters": [{"sdf": %s}], "voxel_size": 0.04}' "$2" >"$1.json"
+    "$VDBSHADE" voxelize "$1.json" -o "$1.vdb" --name "$1" --quiet
+}
+
+@test "several .vdb files, and one of them twice, are their union" {
+    solid ball '{"shape": "sphere", "radius": 0.6, "translate": [-0.9, 0, 0]}'
+    solid block '{"shape": "box", "half_size": [0.4, 0.5, 0.3], "translate": [0.5, 0, 0]}'
+    cat >files.json <<'JSON'
+{"casters": [{"vdb": "ball.vdb"}, {"vdb": "block.vdb", "grid": "block"},
+             {"vdb": "ball.vdb", "grid": "ball", "transform": {"translate": [0.9, 1.2, 0.3], "scale": 0.5}},
+             {"vdb": "block.vdb", "transform": {"rotate_deg": [0, 90, 0], "translate": [0, -1.2, 0]}}],
+ "voxel_size": 0.04}
+JSON
+    cat >shapes.json <<'JSON'
+{"casters": [{"sdf": {"op": "union", "of": [
+    {"shape": "sphere", "radius": 0.6, "translate": [-0.9, 0, 0]},
+    {"shape": "box", "half_size": [0.4, 0.5, 0.3], "translate": [0.5, 0, 0]},
+    {"shape": "sphere", "radius": 0.3, "translate": [0.45, 1.2, 0.3]},
+    {"shape": "box", "half_size": [0.3, 0.5, 0.4], "translate": [0, -1.2, -0.5]}]}}],
+ "voxel_size": 0.04}
+JSON
+    same_distances files.json shapes.json 0.02
+}
+
+@test "a grid that its file does not have" {
+    solid ball '{"shape": "sphere", "radius": 0.6}'
+    refuses_caster 2 '{"vdb": "ball.vdb"}, {"vdb": "ball.vdb", "grid": "cube"}' ball.vdb cube
+    untouched out.vdb
+}
+
+@test "Alembic and USD files are refused by name" {
+    printf '#usda 1.0\n' >set.usda
+    printf 'PXR-USDC' >set.obj
+    printf 'Ogawa' >cache.abc
+    local file
+    for file in set.usda set.obj cache.abc; do
+        refuses 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL, FBX or DAE' -- bake "$file" -o out.vdb.exr --ao 1
+        refuses 2 "$file" 'which is not read' -- voxelize "$file" -o out.vdb
+        refuses_caster 2 "{\"mesh\": \"$file\"}" "$file" 'which is not read'
+        refuses 2 "$file" 'which is not read' -- info "$file"
+    done
+    cp set.usda scene.json
+    refuses 2 scene.json 'a USD file' -- bake scene.json
+    untouched out.vdb
 }

@@ -83,7 +83,7 @@ can() {
     grep -A 4 '"confined": {' stats.json | grep -q '"files": false' || fail "not in --stats"
     run --separate-stderr "$REFUSE" limits seccomp landlock -- "$VDBSHADE" info box.obj
     [[ $stderr == *"limits of resources, seccomp (system calls), Landlock (files)"* ]] || fail "not all are said"
-    refuses 2 "--sandbox 'on': expected auto, require or off" -- info box.obj --sandbox on
+    refuses 2 "--sandbox 'on': expected one of auto|require|off" -- info box.obj --sandbox on
     "$VDBSHADE" bake box.obj -o out.exr "${SMALL[@]}" --quiet --sandbox off --stats stats.json
     grep -q '"confined": null' stats.json || fail "nothing is confined with --sandbox off"
 }

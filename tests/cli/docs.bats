@@ -1,34 +1,36 @@
-# Every scene in docs/scene.md and docs/flat.md bakes, and every command in docs/query.md, docs/view.md, docs/lit.md
-# and docs/pipeline.md runs (blocks of sh; those of bash need a farm).
+# Every scene in docs/scene.md and docs/flat.md bakes, and every command in README.md, docs/query.md, docs/view.md, docs/lit.md and
+# docs/pipeline.md runs (blocks of sh; those of bash need a farm).
 load helper
 
-: "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
+README=$BATS_TEST_DIRNAME/../../README.md
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    ln -s "$(cd "$ASSETS" && pwd)"/* .
-    awk '/^```json$/ { name = sprintf("example%02d.json", ++n); inside = 1; next }
-         /^```$/ { inside = 0 }
-         inside { print > name }' "$DOCS/scene.md"
+prepare() {
+    ln -s "$(cd "$ASSETS" && pwd)" assets
+    ln -s assets/* .
 }
 
-# run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least.
+# scenes_of FILE NAME: the blocks of JSON as NAME01.json and so on.
+scenes_of() {
+    awk -v name="$2" '/^```json$/ { file = sprintf("%s%02d.json", name, ++n); inside = 1; next }
+        /^```$/ { inside = 0 }
+        inside { print > file }' "$DOCS/$1"
+}
+
+# run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least. Lines that a backslash ends are continued.
 run_commands() {
     mkdir bin
     ln -s "$(realpath "$VDBSHADE")" bin/vdbshade
-    ln -s "$(cd "$ASSETS" && pwd)" assets
-    awk '/^```sh$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$DOCS/$1" >commands
+    awk '/^ *```sh$/ { inside = 1; next } /^ *```$/ { inside = 0 } inside' "$DOCS/$1" |
+        sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | sed 's/^ *//' | grep -E "${ONLY:-.}" >commands
     [ "$(grep -c vdbshade commands)" -ge "$2" ]
     while read -r command; do
         PATH=$PWD/bin:$PATH bash -c "set -o pipefail; $command" >/dev/null 2>err.txt || fail "$command: $(cat err.txt)"
     done <commands
 }
 
-@test "there are examples" {
+@test "every scene of docs/scene.md bakes, or voxelizes where it has no receivers" {
+    scenes_of scene.md example
     [ -e example01.json ]
-}
-
-@test "every example bakes, or voxelizes where it has no receivers" {
     for scene in example*.json; do
         if grep -q '"receivers"' "$scene"; then
             # Levels sets that an example names are made first.
@@ -47,9 +49,7 @@ run_commands() {
 }
 
 @test "every flat scene of docs/flat.md" {
-    awk '/^```json$/ { name = sprintf("flat%02d.json", ++n); inside = 1; next }
-         /^```$/ { inside = 0 }
-         inside { print > name }' "$DOCS/flat.md"
+    scenes_of flat.md flat
     [ -e flat02.json ]
     for scene in flat??.json; do
         shade flat "$scene" --quiet
@@ -71,11 +71,16 @@ run_commands() {
     done
 }
 
+# made FILE …
+made() {
+    for file; do
+        [ -s "$file" ] || fail "no $file"
+    done
+}
+
 @test "every command of docs/lit.md" {
     run_commands lit.md 3
-    for made in lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr; do
-        [ -s "$made" ] || fail "no $made"
-    done
+    made lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr
 }
 
 @test "every command of docs/pipeline.md" {
@@ -84,9 +89,12 @@ run_commands() {
 
 @test "every command of docs/view.md" {
     run_commands view.md 11
-    for made in both.html seeds.html view.png court.png baked.png shafts.exr; do
-        [ -s "$made" ] || fail "no $made"
-    done
+    made both.html seeds.html view.png court.png baked.png shafts.exr
+}
+
+@test "every command of the README" {
+    ONLY='^vdbshade' DOCS=$BATS_TEST_DIRNAME/../.. run_commands README.md 4
+    made cloister.exr cloister.png seeds.exr
 }
 
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
@@ -98,7 +106,7 @@ options_of() {
 @test "the documents name every option of --help, and no other" {
     local command
     "$VDBSHADE" --help >help.txt
-    for command in bake voxelize info trade query volume flat render compare regress unwrap view merge help; do
+    for command in $(sed -n '/^Commands:/,/^$/s/^  \([a-z]*\) .*/\1/p' help.txt); do
         "$VDBSHADE" "$command" --help >>help.txt
     done
     options_of help.txt >told.txt
@@ -115,4 +123,44 @@ options_of() {
     [ "$(wc -l <names.txt)" -gt 20 ] || fail "too few: $(cat names.txt)"
     comm -13 declared.txt names.txt >unknown.txt
     [ ! -s unknown.txt ] || fail "not in a header: $(cat unknown.txt)"
+}
+
+# block N FILE: the Nth block of C of a Markdown file.
+block() {
+    awk -v wanted="$1" '/^```c$/ { inside = ++n == wanted; next } /^```$/ { inside = 0 } inside' "$2"
+}
+
+@test "the C of the README, and of the header that includes all, is that of examples/lightmap.c" {
+    local examples=$BATS_TEST_DIRNAME/../../examples header=$BATS_TEST_DIRNAME/../../include/vdbshade/vdbshade.h
+    bake=$(sed -n '/^static vsh_result bake(/,/^}/p' "$examples/lightmap.c")
+    [ "$(block 1 "$README" | tail -n +2)" = "$bake" ] || fail "lightmap.c"
+    [ "$(sed -nE '/^ \*     static vsh_result bake/,/^ \*     }/s/^ \*     ?//p' "$header" | sed 's|// \(.*\)|/* \1 */|')" = "$bake" ] ||
+        fail "vdbshade.h"
+}
+
+# missing [TAG…]: what tools/setup asks for on a system where nothing is installed.
+missing() {
+    mkdir -p stubs
+    printf '#!/bin/sh\nexit 1\n' | tee stubs/dpkg-query >stubs/sudo
+    printf '#!/bin/sh\necho 1000\n' >stubs/id
+    chmod +x stubs/*
+    run env PATH="$PWD/stubs:$PATH" "$BATS_TEST_DIRNAME/../../tools/setup" "$@"
+}
+
+@test "the demo installs what building and baking take, and nothing of Python or tests" {
+    local tools=$BATS_TEST_DIRNAME/../../tools package
+    grep -qx 'tools/setup' "$tools/demo" || fail "tools/demo has another set-up"
+    grep -qx 'tools/setup python test' "$tools/test" || fail "tools/test has another set-up"
+    missing
+    [ "$status" -eq 2 ] || fail "expected exit code 2"
+    [[ $output == *" cmake "*" libopenvdb-dev "* ]] || fail "what building takes is missing"
+    for package in slurmd chromium doxygen clang-tidy lintian bats libcmocka-dev python3-numpy gcovr; do
+        [[ " $output " != *" $package "* ]] || fail "$package is installed"
+    done
+    missing python test
+    for package in cmake slurmd chromium bats libcmocka-dev python3-numpy; do
+        [[ " $output " == *" $package "* ]] || fail "$package is not installed"
+    done
+    missing pyton
+    [[ $status -eq 2 && $output == *"no tag 'pyton'"* ]] || fail "a wrong tag is taken"
 }

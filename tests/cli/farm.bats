@@ -19,8 +19,8 @@ free_port() {
     return 1
 }
 
-# Until the command succeeds, at most so many seconds.
-within() { # SECONDS COMMAND …
+# within SECONDS COMMAND …: until the command succeeds, at most so many seconds.
+within() {
     local end=$((SECONDS + $1))
     shift
     until "$@" >/dev/null 2>&1; do

@@ -1,9 +1,8 @@
-# Runs that are killed, disks that are full at any byte, pipes that nobody reads.
+# Where the output cannot go, and that it comes whole or not at all: runs that are killed, disks that are full at any byte, pipes that
+# nobody reads.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
+prepare() {
     printf 'x,y,z,nx,ny,nz\n' >points.csv
     for i in {1..200}; do
         echo "0.$i,1.01,0.5,0,1,0"
@@ -69,4 +68,98 @@ full_at() {
     run bash -c '"$@" -o - 2>err.txt | true; exit "${PIPESTATUS[0]}"' - "$VDBSHADE" "${QUERY[@]}"
     [ "$status" -eq 3 ] || fail "status"
     grep -q 'standard output: cannot be written: Broken pipe' err.txt || fail "$(cat err.txt)"
+}
+
+BAKE=(bake box.obj "${SMALL[@]}" -o)
+
+@test "a folder that does not exist or cannot be written to, a folder in place of the output, endings, bits and packings that are none" {
+    mkdir folder.exr
+    refuse_each "${BAKE[@]}" <<'LIST'
+3 none/out.exr | none/out.exr
+3 none/stats.json | out.exr --stats none/stats.json
+3 folder.exr | folder.exr
+2 out.xyz | out.xyz
+2 out | out
+2 32 | out.png --bits 32
+2 shadow.moon | out.png --pack R=shadow.moon
+2 "expected one of exr, png," "glb, gltf, obj" | out.fbx
+2 "expected one of exr, png," "glb, gltf, obj" | out.psd
+LIST
+    [ ! -e out.exr ] || fail "written all the same"
+    refuses 2 out.fbx -- render box.obj "${SMALL[@]}" -o out.fbx
+    [[ $stderr != *glb* ]] || fail "render writes no asset"
+    no_leftovers
+    [ "$(id -u)" -ne 0 ] || return 0 # root may write anywhere
+    mkdir shut
+    chmod 555 shut
+    shade "${BAKE[@]}" shut/out.exr
+    chmod 755 shut
+    refused 3 shut/out.exr
+}
+
+@test "the input, a caster and the scene are never replaced" {
+    cp box.obj copy.obj
+    refuses 2 box.obj -- "${BAKE[@]}" box.obj
+    refuses 2 box.obj -- "${BAKE[@]}" ./box.obj
+    ln -s copy.obj link.exr
+    refuses 2 link.exr -- "${BAKE[@]}" link.exr --caster copy.obj
+    refuses 2 box.obj -- "${BAKE[@]}" out.exr --stats box.obj
+    refuses 2 out.exr -- "${BAKE[@]}" out.exr --stats out.exr
+    cmp box.obj copy.obj
+}
+
+@test "a limit on the size of files that a reader's answer passes is told" {
+    # 402 vertices with UVs are 8 KB, however they are sent; the lightmap is under 4.
+    awk 'BEGIN { for (i = 0; i <= 200; ++i) { x = i / 200; printf "v %g 0 0\nv %g 0 1\nvt %g 0\nvt %g 1\n", x, x, x, x }
+         for (i = 1; i < 400; i += 2) printf "f %d/%d %d/%d %d/%d %d/%d\n", i, i, i + 1, i + 1, i + 3, i + 3, i + 2, i + 2 }' >strip.obj
+    old_output out.exr
+    limited "-f 4" bake strip.obj "${SMALL[@]}" --quiet -o out.exr
+    refused 4 strip.obj "ulimit -f"
+    untouched out.exr
+    limited "-f 4" bake strip.obj --sandbox off "${SMALL[@]}" --quiet -o out.exr
+    done_well
+}
+
+@test "a full disk leaves the old lightmap and the old level set" {
+    local out command
+    while read -r out command; do
+        old_output "$out"
+        # the limit counts blocks of 1 KiB; each output takes more
+        limited "-f 1" $command box.obj --sandbox off --quiet -o "$out"
+        refused 3 "$out"
+        untouched "$out"
+    done <<LIST
+out.exr bake ${SMALL[*]} --size 256 --ao 1
+out.png bake ${SMALL[*]} --size 256 --ao 1 --bits 16
+out.vdb voxelize
+LIST
+}
+
+@test "a complete run replaces the old output" {
+    old_output out.exr
+    succeed "${BAKE[@]}" out.exr --quiet
+    [ "$(head -c 4 out.exr | od -An -tx1 | tr -d ' ')" = 762f3101 ] || fail "no EXR"
+    [ -z "$stderr" ] || fail "--quiet said something"
+    no_leftovers
+}
+
+@test "--output-folder takes all outputs of a scene by their names, and nothing else" {
+    mkdir -p elsewhere maps
+    cat >two.json <<'JSON'
+{"casters": [{"mesh": "box.obj"}], "resolution": 16, "ao": {"distance": 1},
+ "receivers": [{"mesh": "box.obj", "size": 16, "output": "maps/one.exr"},
+               {"mesh": "box.obj", "size": 8, "output": "two.png"}]}
+JSON
+    succeed bake two.json --output-folder elsewhere --quiet
+    [ -s elsewhere/one.exr ] && [ -s elsewhere/two.png ] || fail "not there"
+    [ ! -e maps/one.exr ] && [ ! -e two.png ] || fail "in both places"
+    succeed bake two.json --output-folder no/where --quiet
+    [ -s no/where/one.exr ] || fail "the folder was not made"
+    refuse_each bake <<'LIST'
+3 box.obj/maps 'cannot be made' | two.json --output-folder box.obj/maps --quiet
+3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'" | box.obj --ao 1 --resolution 16 -o missing/out.exr
+2 --output-folder | box.obj --ao 1 --output-folder elsewhere -o out.exr
+LIST
+    sed -i 's/two.png/one.exr/' two.json
+    refuses 2 elsewhere/one.exr 'two outputs' -- bake two.json --output-folder elsewhere --quiet
 }

@@ -1,13 +1,17 @@
-# Shared by the command-line tests: VDBSHADE is the binary, ASSETS the folder of sample assets.
+# Shared by the command-line tests: VDBSHADE is the binary, ASSETS and DOCS are the folders of sample assets and documents.
 bats_require_minimum_version 1.5.0
 
 : "${VDBSHADE:?is to name the vdbshade binary}"
 : "${ASSETS:=$BATS_TEST_DIRNAME/../../assets}"
+: "${DOCS:=$BATS_TEST_DIRNAME/../../docs}"
 
-# Each test starts in an empty folder, but for a cube that can be baked.
+MODELS=$BATS_TEST_DIRNAME/../models FONT=/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf
+
+# Each test starts in an empty folder, but for a cube that can be baked, and what prepare() of its file writes.
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
     write_box box.obj
+    ! declare -F prepare >/dev/null || prepare
 }
 
 # write_scene FILE.json MESH [KEYS [KEYS OF THE RECEIVER [DIRECTION]]]: a scene in which a mesh casts and receives, with a sun.
@@ -45,6 +49,45 @@ write_box() {
     } >"$1"
 }
 
+# write_boxes FILE NAME…: cubes in a row, two units from one to the next, each with its faces in all of the unit square.
+write_boxes() {
+    local file=$1
+    shift
+    printf '%s\n' "$@" | awk '
+        BEGIN {
+            split("0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1", p, " ")
+            split("1 4 3 2 5 6 7 8 1 2 6 5 4 8 7 3 1 5 8 4 2 3 7 6", f, " ")
+        }
+        {
+            print "o " $0
+            for (i = 0; i < 8; ++i) print "v", p[3 * i + 1] + 2 * (NR - 1), p[3 * i + 2], p[3 * i + 3]
+            for (i = 0; i < 6; ++i) {
+                u = (i % 3) / 3 + 0.02; v = int(i / 3) / 2 + 0.02
+                print "vt", u, v "\nvt", u + 0.29, v "\nvt", u + 0.29, v + 0.46 "\nvt", u, v + 0.46
+                line = "f"
+                for (k = 1; k <= 4; ++k)
+                    line = line " " f[4 * i + k] + 8 * (NR - 1) "/" 4 * i + k + 24 * (NR - 1)
+                print line
+            }
+        }' >"$file"
+}
+
+# write_floor FILE: a square of 6 × 6 at y = -1 that faces up, with the whole of the UV square.
+write_floor() {
+    printf '%s\n' 'v -3 -1 3' 'v 3 -1 3' 'v 3 -1 -3' 'v -3 -1 -3' 'vt 0 0' 'vt 1 0' 'vt 1 1' 'vt 0 1' \
+        'f 1/1 2/2 3/3' 'f 1/1 3/3 4/4' >"$1"
+}
+
+# write_gltf FILE [BUFFER.bin]: the document on standard input, see gltf.py.
+write_gltf() {
+    python3 "$BATS_TEST_DIRNAME/gltf.py" write "$@"
+}
+
+# show_gltf FILE EXPRESSION…: what is in the file.
+show_gltf() {
+    python3 "$BATS_TEST_DIRNAME/gltf.py" show "$@"
+}
+
 # A small bake of box.obj, which is there: quick, and right in every respect.
 SMALL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
 
@@ -57,13 +100,42 @@ old_output() {
     printf 'old' >"$1"
 }
 
-# Whether two images or level sets hold the same values, whatever they tell of where they come from.
+# Whether two images or level sets hold the same values, whatever their metadata.
 same_values() {
     "$VDBSHADE" compare "$1" "$2" --max-difference 0 --max-coverage 0 --quiet
 }
 
+same() {
+    same_values "$1" "$2" || fail "$1 and $2 are not the same"
+}
+
+differ() {
+    ! same_values "$1" "$2" || fail "$1 and $2 are the same"
+}
+
+# values_of FILE CHANNEL: "MIN MEAN MAX" as info prints them.
+values_of() {
+    "$VDBSHADE" info "$1" | sed -n "s/^channel '$2': min \(.*\), mean \(.*\), max \(.*\)$/\1 \2 \3/p"
+}
+
+# mean_of FILE CHANNEL
+mean_of() {
+    values_of "$@" | cut -d' ' -f2
+}
+
+# number_in STATS.json KEY: the first number of that key.
+number_in() {
+    grep -o "\"$2\": [0-9.e+-]*" "$1" | head -1 | cut -d' ' -f2
+}
+
+# holds CONDITION: a condition of awk on numbers.
+holds() {
+    awk "BEGIN { exit !($1) }" || fail "not so: $1"
+}
+
 fail() {
     echo "$*"
+    [ -z "${CASE:-}" ] || echo "case: $CASE"
     echo "status: $status"
     echo "stdout: $output"
     echo "stderr: $stderr"
@@ -122,26 +194,101 @@ succeed() {
     ends 0 "$@"
 }
 
-# info_tells FILE TEXT …: what info prints of the file has every text.
-info_tells() {
-    local text
-    succeed info "$1"
-    for text in "${@:2}"; do
-        [[ $output == *"$text"* ]] || fail "not told: $text"
+# compile NAME: makes NAME.c a program with the library beside VDBSHADE.
+compile() {
+    local build
+    build=$(dirname "$(realpath "$VDBSHADE")")
+    "${CC:-cc}" -std=gnu11 -O1 ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" "$1.c" -L"$build" -lvdbshade -Wl,-rpath,"$build" -o "$1"
+}
+
+# in_order STREAM CONTENT TEXT …: the content has the texts in this order.
+in_order() {
+    local stream=$1 rest=$2 text
+    for text in "${@:3}"; do
+        [[ $rest == *"$text"* ]] || fail "expected '$text' on $stream"
+        rest=${rest#*"$text"}
     done
+}
+
+# says TEXT …: standard error of the last run has the texts in this order.
+says() {
+    in_order "standard error" "$stderr" "$@"
+}
+
+# prints TEXT …: standard output of the last run has them.
+prints() {
+    in_order "standard output" "$output" "$@"
+}
+
+# checked CODE CHECK TEXT … -- ARG …: runs the program, which must end with CODE and pass the check with the texts.
+checked() {
+    local code=$1 check=$2 texts=()
+    shift 2
+    while [ "$1" != -- ]; do
+        texts+=("$1")
+        shift
+    done
+    ends "$code" "${@:2}"
+    "$check" "${texts[@]}"
+}
+
+# succeed_saying TEXT … -- ARG …: runs the program, which succeeds and has the texts on standard error, in this order.
+succeed_saying() {
+    checked 0 says "$@"
+}
+
+# succeed_printing TEXT … -- ARG …: the same of standard output.
+succeed_printing() {
+    checked 0 prints "$@"
+}
+
+# differ_printing TEXT … -- ARG …: the same of what `compare` and `regress` print of differences.
+differ_printing() {
+    checked 1 prints "$@"
+}
+
+# info_tells FILE TEXT …: what info prints of the file has the texts in this order.
+info_tells() {
+    succeed info "$1"
+    prints "${@:2}"
 }
 
 # refuse_each WORD …: runs the program once for each line "CODE WORD … | ARG …" of standard input, with the ARGs behind the given
 # words. Each run must end as refused() says.
 refuse_each() {
     local -a cases said more
-    local case
+    local CASE
     mapfile -t cases
-    for case in "${cases[@]}"; do
-        eval "said=(${case%%|*}) more=(${case#*|})"
+    for CASE in "${cases[@]}"; do
+        eval "said=(${CASE%%|*}) more=(${CASE#*|})"
         shade "$@" "${more[@]}"
-        refused "${said[@]}" || fail "$case"
+        refused "${said[@]}"
     done
+}
+
+# limited LIMIT ARG …: runs the program with a limit of ulimit, such as "-f 4".
+limited() {
+    run --separate-stderr bash -c 'ulimit $1; shift; exec "$@"' bash "$1" "$VDBSHADE" "${@:2}"
+}
+
+# interrupted SIGNAL SECONDS ARG …: runs the program until it says something, waits, and sends the signal, which must end it. Sets
+# took, the time that it takes to end, ms. A shell's background jobs ignore SIGINT until the program has its own handler, so an earlier
+# signal would be lost. A run that is not interrupted ends by its limit of processor seconds.
+interrupted() {
+    local pid start
+    rm -f err.txt
+    (ulimit -t 60 && exec "$VDBSHADE" "${@:3}" --progress 2>err.txt) &
+    pid=$!
+    until [ -s err.txt ]; do
+        sleep 0.01
+    done
+    sleep "$2"
+    kill -s "$1" "$pid"
+    start=$(date +%s%N)
+    status=0
+    wait "$pid" || status=$?
+    took=$((($(date +%s%N) - start) / 1000000)) output= stderr=$(cat err.txt)
+    [ "$status" -eq 130 ] || fail "expected 130"
 }
 
 # unless_sanitized REASON: skips the test if the program is built with a sanitizer.
@@ -149,34 +296,17 @@ unless_sanitized() {
     case ${CFLAGS:-} in *-fsanitize*) skip "$1" ;; esac
 }
 
-# write_packed FILE TYPE TRANSFORM: a floor under a smaller floor. Their UVs have one layout, as integers or floats. The texture has
-# the TRANSFORM.
+# write_packed FILE TYPE FACTOR TRANSFORM: a floor under a smaller floor. Their UVs are of that type of component, times the
+# factor. The texture has the transform.
 write_packed() {
-    python3 - "$@" <<'PY'
-import base64, json, struct, sys
-path, kind, transform = sys.argv[1], sys.argv[2], sys.argv[3]
-floor = [((-2, 0, 2), (.0, 1.)), ((2, 0, 2), (.75, 1.)), ((2, 0, -2), (.75, .25)), ((-2, 0, -2), (.0, .25))]
-above = [((-1, 1, 1), (.75, .25)), ((0, 1, 1), (1., .25)), ((0, 1, 0), (1., .0)), ((-1, 1, 0), (.75, .0))]
-places = b"".join(struct.pack("<3f", *p) for p, _ in floor + above)
-uvs = b"".join(struct.pack("<2f", *uv) if kind == "float" else struct.pack("<2H", *(int(4096 * c) for c in uv)) for _, uv in floor + above)
-order = struct.pack("<6H", 0, 1, 2, 0, 2, 3)
-body = places + uvs + order
-step = 8 if kind == "float" else 4
-def uv(first):
-    return {"bufferView": 1, "byteOffset": first * step, "componentType": 5126 if kind == "float" else 5123, "count": 4, "type": "VEC2"}
-def place(first):
-    return {"bufferView": 0, "byteOffset": first * 12, "componentType": 5126, "count": 4, "type": "VEC3"}
-info = {"index": 0}
-if transform:
-    info["extensions"] = {"KHR_texture_transform": json.loads(transform)}
-root = {"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1]}], "nodes": [{"name": "floor", "mesh": 0}, {"name": "above", "mesh": 1}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 2 * i, "TEXCOORD_0": 2 * i + 1}, "indices": 4, "material": 0}]} for i in (0, 1)],
-        "accessors": [place(0), uv(0), place(4), uv(4), {"bufferView": 2, "componentType": 5123, "count": 6, "type": "SCALAR"}],
-        "bufferViews": [{"buffer": 0, "byteLength": 96}, {"buffer": 0, "byteOffset": 96, "byteLength": len(uvs), "byteStride": step},
-                        {"buffer": 0, "byteOffset": 96 + len(uvs), "byteLength": 12}],
-        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": info}}], "textures": [{"source": 0}], "images": [{"uri": "none.png"}],
-        "extensionsUsed": ["KHR_mesh_quantization", "KHR_texture_transform"],
-        "buffers": [{"byteLength": len(body), "uri": "data:;base64," + base64.b64encode(body).decode()}]}
-json.dump(root, open(path, "w"))
-PY
+    uvs() {
+        printf '"attributes": {"TEXCOORD_0": {"VEC2": %s, "componentType": %s, "times": %s}}' "$3" "$1" "$2"
+    }
+    write_gltf "$1" <<JSON
+{"nodes": [{"name": "floor", "mesh": 0}, {"name": "above", "mesh": 1}],
+ "meshes": [{"primitives": [{"plate": [-2, 0, -2, 2, 2], $(uvs "$2" "$3" '[0, 1, 0.75, 1, 0.75, 0.25, 0, 0.25]'), "material": 0}]},
+            {"primitives": [{"plate": [-1, 1, 0, 0, 1], $(uvs "$2" "$3" '[0.75, 0.25, 1, 0.25, 1, 0, 0.75, 0]'), "material": 0}]}],
+ "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0${4:+, \"extensions\": {\"KHR_texture_transform\": $4\}}}}}],
+ "textures": [{"source": 0}], "images": [{"uri": "none.png"}], "extensionsUsed": ["KHR_mesh_quantization", "KHR_texture_transform"]}
+JSON
 }

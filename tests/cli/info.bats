@@ -1,74 +1,76 @@
-# info: what a file holds, and what is wrong with it.
+# info: what a file holds, and what is wrong with it; units, materials and buffers of meshes.
 load helper
 
-@test "a sound mesh has no problems" {
-    succeed info box.obj
-    [[ $output == *"triangles: 12"*"UV sets: 1"*"bounds: 0 0 0 to 1 1 1"* && $output != *problem* ]] || fail "not so"
+@test "what a mesh, a level set and a scene hold" {
+    info_tells box.obj "triangles: 12" "UV sets: 1" "bounds: 0 0 0 to 1 1 1"
+    [[ $output != *problem* ]] || fail "a problem"
+    succeed info "$ASSETS/cloister.glb"
+    [[ $output != *"other charts"* && $output != *"leave the UV square"* ]] || fail "UVs"
+    succeed voxelize box.obj -o box.vdb --voxel-size 0.05 --name hull --quiet
+    info_tells box.vdb "grid 'hull'" "class: level set" "voxel size: 0.05 0.05 0.05"
+    [[ $output != *problem* ]] || fail "a problem"
+    info_tells "$ASSETS/seeds.json" "caster 0: sdf" "light 'sun'" "receiver 0: "
 }
 
 @test "an open mesh, degenerate triangles and overlapping UVs are problems" {
     { sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' box.obj && echo 'f 1/1 1/1 2/2'; } >bad.obj
-    succeed info bad.obj
-    [[ $output == *"problem: 3 open edges"*"problem: 1 triangles of zero area"*"lie over other charts"* ]] || fail "not so"
+    succeed_printing "problem: 3 open edges" "problem: 1 triangles of zero area" "lie over other charts" -- info bad.obj
 }
 
-@test "the sample asset is sound" {
-    succeed info "$ASSETS/cloister.glb"
-    [[ $output != *"other charts"* && $output != *"leave the UV square"* ]] || fail "UVs"
-}
-
-@test "a level set" {
-    succeed voxelize box.obj -o box.vdb --voxel-size 0.05 --name hull --quiet
-    succeed info box.vdb
-    [[ $output == *"grid 'hull'"*"class: level set"*"voxel size: 0.05 0.05 0.05"* ]] || fail "not what was written"
-    [[ $output != *problem* ]] || fail "a problem"
-}
-
-@test "a scene" {
-    succeed info "$ASSETS/seeds.json"
-    [[ $output == *"caster 0: sdf"*"light 'sun'"*"receiver 0: "* ]] || fail "no summary"
-}
-
-@test "missing, damaged and empty files" {
-    for ending in obj vdb exr json; do
-        refuses 3 "none.$ending" -- info "none.$ending"
-    done
-    for ending in obj glb ply stl exr png vdb; do
-        : >"empty.$ending"
-        shade info "empty.$ending"
-        [ "$status" -eq 2 ] || [ "$status" -eq 3 ] || fail "$ending: expected 2 or 3"
-        refused "$status" "empty.$ending"
-    done
-}
-
-@test "a damaged level set, byte by byte, never takes the program down" {
-    succeed voxelize box.obj -o box.vdb --resolution 16 --quiet
-    local size at part # not i: Bats' own tracing counts with it
-    size=$(wc -c <box.vdb)
-    for ((part = 1; part <= 40; ++part)); do
-        at=$((part * size / 41))
-        { head -c "$at" box.vdb && printf '\377\377\377\177' && tail -c +$((at + 5)) box.vdb; } >bad.vdb
-        shade info bad.vdb
-        case $status in
-        0 | 2 | 3 | 4) ;;
-        *) fail "changed at byte $at" ;;
-        esac
-    done
-}
-
-@test "control characters of a file name stay out of the terminal" {
+@test "control characters of file names and of names within files stay out of the terminal" {
     refuses 3 'none?[31m?.obj' -- info $'none\033[31m\n.obj'
-}
-
-@test "control characters of names within files stay out of the terminal" {
     local name=$'b\033[31mox\302\233'
     write_box "$name.obj"
     printf '{"casters": [{"mesh": "b\\u001b[31mox\\u009b.obj"}], "voxel_size": 0.2,
         "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}]}' >scene.json
-    succeed info scene.json
-    [[ "$output" == *'b?[31mox??.obj'* ]] || fail "$output"
+    succeed_printing 'b?[31mox??.obj' -- info scene.json
     mkdir -p cases
     printf '{"cases": [{"scene": "none.json", "command": "volume", "output": "a\\u001b[31m.vdb", "name": "c\\u001b[31m"}]}' >cases/regress.json
-    shade regress cases
-    [[ "$output" == *'c?[31m: failed'*'a?[31m.vdb: the bake ended'* ]] || fail "$output"
+    ends 3 regress cases
+    prints 'c?[31m: failed' 'a?[31m.vdb: the bake ended'
+}
+
+@test "info tells a file's unit, and the size in metres" {
+    info_tells "$MODELS/scene.fbx" "unit: 0.01 m; bounds are in metres" "bounds: 0 2 -3 to 2 4 -1"
+    info_tells "$MODELS/scene.obj" "unit: none"
+}
+
+@test "--unit overrules, by a name or in metres" {
+    succeed_printing "bounds: 0 200 -300 to 200 400 -100" -- info --unit m "$MODELS/scene.fbx"
+    succeed_printing "bounds: 0 0.0508 -0.0762 to 0.0508 0.1016 -0.0254" -- info --unit in "$MODELS/scene.obj"
+    succeed_printing "bounds: 0 20 -30 to 20 40 -10" -- info --unit 10 "$MODELS/scene.obj"
+    succeed voxelize "$MODELS/scene.obj" -o a.vdb --unit cm --resolution 32
+    info_tells a.vdb "voxel size: 0.0014667"
+    refuses 2 "--unit 'yard'" -- info --unit yard "$MODELS/scene.obj"
+}
+
+@test "blended materials cast nothing unless asked, and one line says so" {
+    succeed_saying "1 of 3 meshes have blended materials" "--cast-blended" -- voxelize "$MODELS/scene.glb" -o without.vdb --resolution 32
+    succeed voxelize "$MODELS/scene.glb" -o with.vdb --resolution 32 --cast-blended
+    [[ $stderr != *blended* ]] || fail "told all the same: $stderr"
+    printf '{"casters": [{"mesh": "%s"}], "resolution": 32, "cast_blended": true}' "$MODELS/scene.glb" >a.json
+    succeed voxelize a.json -o scene.vdb
+    [[ $stderr != *blended* ]] || fail "the scene: $stderr"
+    differ with.vdb without.vdb
+    same with.vdb scene.vdb
+}
+
+@test "what is not read is refused with what would help" {
+    sed 's/"asset"/"extensionsRequired":["KHR_node_visibility"],"asset"/' "$MODELS/scene.gltf" >packed.gltf
+    cp "$MODELS/scene.bin" .
+    refuses 2 "KHR_node_visibility" -- info packed.gltf
+    refused 2 "only the visible nodes"
+    cp "$MODELS/scene.gltf" alone.gltf && rm scene.bin
+    refuses 3 "scene.bin': cannot be read: No such file" -- info alone.gltf
+    printf 'BLENDER-v304' >a.blend
+    refuses 2 "export it as GLB" -- info a.blend
+    printf 'anything' >a.x3d
+    refuses 2 "GLB" -- info a.x3d
+}
+
+@test "a file with blanks in its name is read in every format" {
+    for format in glb fbx dae obj ply stl; do
+        cp "$MODELS/scene.$format" "my scene.$format"
+        info_tells "my scene.$format" ", 16 triangles;"
+    done
 }

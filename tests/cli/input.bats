@@ -1,26 +1,49 @@
-# Bad input: one line on standard error, the exit code of its kind, the old output untouched.
+# Bad input and files that mean harm: the exit code of its kind, one line that names the file, the place in it, the value and the limit,
+# and the old output untouched. Code 3 is for a file that cannot be read through, 2 for what is written in one that can.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
+prepare() {
     old_output out.exr
+    printf '0,5,0,0,1,0\n' >points.csv
+}
+
+bake() {
+    shade bake "$1" -o out.exr "${SMALL[@]}" "${@:2}"
 }
 
 # refuse_input CODE INPUT WORD …: a bake of the INPUT ends with CODE, says its name and the WORDs, and leaves the old output.
 refuse_input() {
-    refuses "$1" "${@:2}" -- bake "$2" -o out.exr "${SMALL[@]}"
+    bake "$2"
+    refused "$1" "${@:2}"
     untouched out.exr
 }
 
-@test "a mesh or scene that is not there, a folder and an empty file are refused with code 3" {
+# refuse_change CODE SED WORD …: the same of box.obj with a change.
+refuse_change() {
+    sed -E "$2" box.obj >bad.obj
+    refuse_input "$1" bad.obj "${@:3}"
+}
+
+# write_casters NAME CASTERS [MORE]: a scene of these casters, with a receiver.
+write_casters() {
+    printf '{"casters": [%s], "lights": [{"name": "sun", "type": "directional", "direction": [0.3, 1, 0.2]}],
+        "receivers": [{"mesh": "box.obj", "size": 8, "output": "out.exr"}]%s}' "$2" "$3" >"$1"
+}
+
+@test "a mesh, scene or other file that is not there, a folder and an empty file are refused with code 3" {
+    local ending
     refuse_input 3 none.obj
     refuse_input 3 none.json
+    for ending in obj vdb exr json; do
+        refuses 3 "none.$ending" -- info "none.$ending"
+    done
     refuses 3 none.obj -- bake box.obj -o out.exr "${SMALL[@]}" --caster none.obj
-    refuses 3 none.glb 'cannot be opened' -- bake none.glb
-    refuses 3 none.glb 'cannot be opened' -- bake none.glb -o out.exr
-    refuses 3 none.glb 'cannot be opened' -- render none.glb -o out.png
-    refuses 3 none.glb 'cannot be opened' -- volume none.glb -o out.vdb
+    refuse_each <<'LIST'
+3 none.glb 'cannot be opened' | bake none.glb
+3 none.glb 'cannot be opened' | bake none.glb -o out.exr
+3 none.glb 'cannot be opened' | render none.glb -o out.png
+3 none.glb 'cannot be opened' | volume none.glb -o out.vdb
+LIST
     mkdir folder.obj
     refuse_input 3 folder.obj
     : >empty.obj
@@ -32,29 +55,61 @@ refuse_input() {
     refuse_input 2 points.obj
     printf 'v 0 0 0\nv 1 0 0\nvt 0 0\nvt 1 0\nf 1/1 2/2 1/1\n' >line.obj
     refuse_input 2 line.obj
-    sed -e '/^vt/d' -e 's,/[0-9]*,,g' box.obj >bare.obj
-    refuse_input 2 bare.obj 'no UVs'
+    refuse_change 2 '/^vt/d; s,/[0-9]*,,g' 'no UVs'
     refuses 2 box.obj 'UV set 3' -- bake box.obj -o out.exr "${SMALL[@]}" --uv-set 3
     untouched out.exr
 }
 
 @test "vertices and UVs that are not finite and indices out of range are refused" {
-    local change
-    for change in 's/^v 1 1 1/v 1 nan 1/' 's/^v 1 1 1/v 1 inf 1/' 's/^v 1 1 1/v 1 -inf 1/' 's/^v 1 1 1/v 1 1e999 1/' \
-        's/^vt 0.31 0.02/vt nan 0.02/' 's,^f 1/1 4/2 3/3,f 1/1 4/2 3/99,'; do
-        sed "$change" box.obj >bad.obj
-        refuse_input 2 bad.obj
+    local change value
+    for value in nan -nan inf -inf 1e999; do
+        refuse_change 2 "s/^v 1 1 1/v 1 $value 1/"
     done
-    sed 's,^f 1/1 4/2 3/3,f 1/1 99/2 3/3,' box.obj >bad.obj
-    refuse_input 2 bad.obj 99
+    for change in 's/^vt 0.31 0.02/vt nan 0.02/' 's,^f 1/1 4/2 3/3,f 1/1 4/2 3/99,' 's,^f 1/1 4/2,f 1/1 4294967295/2,' 's,^f 1/1 4/2,f 1/1 -99/2,'; do
+        refuse_change 2 "$change"
+    done
+    refuse_change 2 's,^f 1/1 4/2 3/3,f 1/1 99/2 3/3,' 99
+    { printf 'ply\nformat binary_little_endian 1.0\nelement vertex 3\n'
+      printf 'property float %s\n' x y z s t
+      printf 'element face 1\nproperty list uchar int vertex_indices\nend_header\n'
+      perl -e 'print pack("f<8 L< f<6 C l<3", 0, 0, 0, 0, 0, 1, 0, 0, 0x7fc00000, 0, 0, 1, 0, 0, 1, 3, 0, 1, 2)'; } >nan.ply
+    refuse_input 2 nan.ply "nan.ply: mesh 0: vertex 1: UV (nan, 0) is not finite"
 }
 
-@test "zero-area triangles are skipped and counted" {
-    { cat box.obj && printf 'f 1/1 1/1 2/2\nf 3/3 3/3 3/3\n'; } >sliver.obj
-    succeed bake sliver.obj -o out.exr "${SMALL[@]}" --verbose
-    [[ $stderr == *"2 triangles of zero area"* ]] || fail "they are not counted"
+@test "vertices far out are a limit" {
+    local value
+    for value in 1e30 -1e30 1e38; do
+        refuse_change 4 "s/^v 1 1 1/v 1 $value 1/" 'voxel size'
+        refuses 4 'voxel size' -- bake bad.obj -o out.exr --ao 1 --size 32 --voxel-size 0.05
+    done
+    refuse_change 4 's/^v ([01]) ([01]) ([01])/v \1e30 \2e30 \3e30/' 'voxel size'
+}
+
+@test "triangles of zero area, a million too, are skipped and counted" {
     succeed bake box.obj -o whole.exr "${SMALL[@]}"
-    same_values out.exr whole.exr
+    { cat box.obj && printf 'f 1/1 1/1 2/2\nf 3/3 3/3 3/3\n'; } >sliver.obj
+    succeed_saying "2 triangles of zero area" -- bake sliver.obj -o out.exr "${SMALL[@]}" --verbose
+    same out.exr whole.exr
+    { cat box.obj && yes 'f 1/1 1/1 2/2' | head -n 1000000; } >many.obj
+    succeed_saying "1000000 triangles of zero area" -- bake many.obj -o out.exr "${SMALL[@]}" --verbose
+    same out.exr whole.exr
+}
+
+# solid FILE: what info says of the level set of a mesh, without where it came from.
+solid() {
+    "$VDBSHADE" voxelize "$1" -o solid.vdb --voxel-size 0.05 --quiet "${@:2}"
+    "$VDBSHADE" info solid.vdb | grep -E 'active voxels|voxel size|background|problem'
+}
+
+@test "faces that are missing, turned inward or given twice" {
+    head -n -2 box.obj >open.obj
+    succeed_saying "4 open edges" -- bake open.obj -o out.exr "${SMALL[@]}" --verbose
+    solid box.obj >sound.txt
+    sed -E 's/^f ([^ ]*) ([^ ]*) ([^ ]*)/f \1 \3 \2/' box.obj >inward.obj
+    ! cmp -s sound.txt <(solid inward.obj) || fail "a room is filled"
+    solid inward.obj --treat '*=solid' | cmp sound.txt -
+    { cat box.obj && grep '^f ' box.obj; } >twice.obj
+    solid twice.obj | cmp sound.txt -
 }
 
 @test "a voxel size so small that the memory limit would be passed" {
@@ -70,38 +125,12 @@ refuse_input() {
     [ ! -e out.webp ]
 }
 
-@test "a scene file cut in the middle" {
+@test "a scene file cut in the middle, or whose flags do not fit it" {
     sed 's,seeds_floor.obj,box.obj,; s,seeds.exr,out.exr,' "$ASSETS/seeds.json" >whole.json
-    local size
-    size=$(wc -c <whole.json)
-    for part in 1 2 3 5 7; do
-        head -c $((size * part / 8)) whole.json >cut.json
+    for part in 0 1 2 3 5 7; do
+        head -c $(($(wc -c <whole.json) * part / 8)) whole.json >cut.json
         refuses 2 cut.json -- bake cut.json
     done
-    : >cut.json
-    refuses 2 cut.json -- bake cut.json
-    untouched out.exr
-}
-
-@test "a damaged level set" {
-    succeed voxelize box.obj -o box.vdb --resolution 24 --quiet
-    cat >vdb.json <<'JSON'
-{"casters": [{"vdb": "cut.vdb"}], "ao": {"distance": 1},
- "receivers": [{"mesh": "box.obj", "size": 16, "output": "out.exr"}]}
-JSON
-    head -c 700 box.vdb >cut.vdb
-    refuses 3 cut.vdb -- bake vdb.json
-    printf 'no level set at all' >cut.vdb
-    refuses 3 cut.vdb -- bake vdb.json
-    untouched out.exr
-}
-
-@test "a cut binary model" {
-    head -c 3000 "$ASSETS/cloister.glb" >cut.glb
-    refuse_input 3 cut.glb
-}
-
-@test "a scene whose flags do not fit it" {
     cat >two.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}], "ao": {"distance": 1}, "resolution": 24,
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"},
@@ -110,8 +139,44 @@ JSON
     refuses 2 two.json -- bake two.json -o out.exr
     refuses 2 --sun -- bake two.json --sun 0,1,0
     untouched out.exr
-    [ ! -e a.exr ]
-    [ ! -e b.exr ]
+    [ ! -e a.exr ] && [ ! -e b.exr ]
+}
+
+@test "what is cut short, or of another kind than its name says, ends with 3" {
+    local one
+    for one in exr png tif jpg; do
+        "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o "whole.$one" 2>/dev/null
+    done
+    "$VDBSHADE" voxelize box.obj --resolution 16 --quiet -o whole.vdb
+    for one in glb stl ply fbx; do
+        cp "$MODELS/scene.$one" "whole.$one"
+    done
+    for one in exr png tif jpg vdb glb stl ply fbx; do
+        head -c $(($(stat -c %s "whole.$one") / 3)) "whole.$one" >"cut.$one"
+        printf 'nothing of the kind' >"other.$one"
+        : >"empty.$one"
+        refuses 3 "cut.$one: " -- info "cut.$one"
+        refuses 3 "other.$one: " -- info "other.$one"
+        refuses 3 "empty.$one: " -- info "empty.$one"
+    done
+    refuses 3 cut.exr -- compare whole.exr cut.exr
+    refuse_input 3 cut.glb
+    for one in cut other; do
+        write_casters vdb.json "{\"vdb\": \"$one.vdb\"}"
+        refuses 3 $one.vdb -- bake vdb.json
+    done
+    untouched out.exr
+}
+
+@test "what can be read and says what cannot be used ends with 2, and its place" {
+    printf 'v 0 0 0\nv 1 0\n' >bad.obj
+    printf '{"casters": 1}' >bad.json
+    printf 'a,b,c\n0,0,0\n' >bad.csv
+    refuse_each <<'LIST'
+2 "bad.obj: line 2" | info bad.obj
+2 "bad.json:1:" | info bad.json
+2 "bad.csv: the header names no column x" | query box.obj --points bad.csv --sun 0,1,0 --sun-angle 5 --resolution 16 -o -
+LIST
 }
 
 # What stands in a file may take a hundred times its size, and is refused before it does.
@@ -124,10 +189,118 @@ JSON
 }
 
 @test "two images that are compared count together" {
-    write_box box.obj
-    run -0 "$VDBSHADE" bake box.obj --sun 1,2,1 --size 512 --resolution 8 --method hard -o one.exr --quiet
+    succeed bake box.obj --sun 1,2,1 --size 512 --resolution 8 --method hard -o one.exr --quiet
     refuses 4 'one.exr: about 16 MB are needed, over the memory limit of 12 MB' -- compare one.exr one.exr --memory-limit 12M
-    run -0 "$VDBSHADE" compare one.exr one.exr --memory-limit 18M
-    run -0 "$VDBSHADE" info one.exr --memory-limit 11M
+    succeed compare one.exr one.exr --memory-limit 18M
+    succeed info one.exr --memory-limit 11M
     refuses 4 'one.exr: about ' 'over the memory limit of 5 MB' -- info one.exr --memory-limit 5M
+}
+
+@test "--sandbox off reads the same without a child" {
+    "$VDBSHADE" voxelize box.obj -o box.vdb --quiet --resolution 16
+    succeed info box.vdb
+    local there=$output
+    succeed info box.vdb --sandbox off
+    [ "$output" = "$there" ] || fail "it is not the same"
+    # where no child can be had, nothing is read but with --sandbox off
+    if [ "$(id -u)" -ne 0 ]; then
+        (ulimit -u 1 && ! "$VDBSHADE" info box.vdb)
+        (ulimit -u 1 && "$VDBSHADE" info box.vdb --sandbox off)
+    fi
+}
+
+@test "the reader's argument alone does nothing" {
+    run --separate-stderr "$VDBSHADE" --vdbshade-reader </dev/null
+    [ "$status" -ne 0 ] || fail "expected a failure"
+    [ -z "$output" ] || fail "expected no output"
+}
+
+@test "changed bytes of every kind of file never take the program down" {
+    local ending size at part # not i: Bats' own tracing counts with it
+    "$VDBSHADE" voxelize box.obj -o a.vdb --quiet --resolution 16
+    cp "$ASSETS/thin.glb" a.glb
+    cp "$ASSETS/emblem.png" a.png
+    "$VDBSHADE" bake box.obj -o a.tif --quiet "${SMALL[@]}"
+    for ending in vdb glb png tif; do
+        size=$(wc -c <"a.$ending")
+        for ((part = 1; part <= (ending == vdb ? 40 : 6); ++part)); do
+            at=$((ending == vdb ? part * size / 41 : part * part * size / 49))
+            { head -c "$at" "a.$ending" && printf '\377\377\377\177' && tail -c +$((at + 5)) "a.$ending"; } >"bad.$ending"
+            shade info "bad.$ending"
+            [[ $status == [0234] ]] || fail "$ending changed at byte $at"
+        done
+    done
+}
+
+# by_each INPUT CODE WORD…: every command that makes a field of its casters refuses it with the code and the words.
+by_each() {
+    local input=$1 code=$2
+    shift 2
+    refuses "$code" "$input: " "$@" -- bake "$input" --quiet -o out.exr
+    refuses "$code" "$input: " "$@" -- query "$input" --points points.csv --quiet -o out.csv
+    refuses "$code" "$input: " "$@" -- volume "$input" --quiet -o out.vdb
+    refuses "$code" "$input: " "$@" -- render "$input" --size 8x8 --quiet -o out.png
+}
+
+@test "a voxel size out of range names the scene, and the layer" {
+    local ball='{"sdf": {"shape": "sphere", "radius": 1}}'
+    write_casters below.json "$ball" ', "voxel_size": 1e-13'
+    refuses 2 "below.json:2:" "voxel_size: 1e-13 is out of range 1e-12 … 1e+12" -- bake below.json --quiet -o out.exr
+    write_casters small.json "$ball" ', "voxel_size": 1e-12'
+    by_each small.json 4 "voxel size 1e-12: " "5.36871e+08 at most"
+    write_casters large.json '{"sdf": {"shape": "sphere", "radius": 1e14}}' ', "resolution": 8'
+    by_each large.json 4 "voxel size 2.5e+13: " "1e-12 … 1e+12"
+    write_casters far.json '{"sdf": {"shape": "sphere", "radius": 1, "translate": [1e14, 0, 0]}}' ', "resolution": 8'
+    by_each far.json 4 "4e+14 voxels from the origin, 1e12 at most"
+    refuses 4 "far.json: voxel size " -- voxelize far.json --quiet -o out.vdb
+    write_casters layer.json "$ball, {\"sdf\": {\"shape\": \"sphere\", \"radius\": 1}, \"layer\": \"clouds\"}" \
+        ', "resolution": 8, "layers": [{"name": "clouds", "voxel_size": 1e-12}]'
+    by_each layer.json 4 "layer 'clouds': voxel size 1e-12: "
+}
+
+@test "a mesh too large, too small or too far for distances is named, whether it gets voxels or not" {
+    local size
+    for size in 1e-30 1e30; do
+        printf "v 0 0 0\nv $size 0 0\nv 0 $size 0\nvt 0 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\n" >huge.obj
+        refuses 4 "huge.obj: " "; scale the scene" -- bake huge.obj --sun 0,1,0 --size 8 --quiet -o out.exr
+        refuses 4 "huge.obj: voxel size " -- bake huge.obj --sun 0,1,0 --size 8 --method cone --quiet -o out.exr
+        refuses 4 "huge.obj: voxel size " -- voxelize huge.obj --quiet -o out.vdb
+    done
+    shade query box.obj --caster huge.obj --sun 0,1,0 --points points.csv --quiet -o out.csv # of 1e30
+    refused 4 "box.obj: " "; scale the scene"
+    write_casters far.json '{"mesh": "box.obj", "transform": {"translate": [1e14, 0, 0]}}'
+    by_each far.json 4 "from the origin"
+}
+
+@test "what has no outline or no surface names the scene or the image" {
+    write_casters blank.json "{\"text\": \"  \", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}" ', "resolution": 8'
+    by_each blank.json 2 "has no outline: nothing in it is solid"
+    write_casters nothing.json '{"sdf": {"op": "subtraction", "of": [{"shape": "sphere", "radius": 1},
+        {"shape": "sphere", "radius": 2}]}}' ', "resolution": 8'
+    by_each nothing.json 2 "no surface"
+}
+
+@test "what a scene names is told with the scene: a mask of a plane, an output, a lightmap's channel" {
+    printf '{"region": [-1, -1, 1, 1], "casters": [{"mask": "none.png", "size": 1}],
+        "lights": [{"name": "a", "type": "disc", "position": [0, 0]}]}' >plane.json
+    refuses 3 "plane.json: casters[0]: none.png: " -- flat plane.json --quiet -o out.exr
+    write_scene scene.json box.obj
+    sed -i 's/out.exr/bake.xyz/' scene.json
+    refuses 2 "scene.json: receivers[0]: output bake.xyz: ending 'xyz'" -- bake scene.json --size 8 --quiet
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --pack R=shadow.sun -o grey.png
+    shade render box.obj --sun 0.3,1,0.2 --size 8x8 --resolution 12 --lightmap grey.png --quiet -o out.png
+    refused 2 "grey.png: lightmap 0: no channel shadow.sun"
+}
+
+@test "a file that a scene names and that cannot be read is told with the scene, and why, however long its name is" {
+    local name command
+    for name in none.obj "$(printf 'x%.0s' {1..300})" "$(printf 'x%.0s' {1..70000})"; do
+        write_casters scene.json "{\"mesh\": \"$name\"}"
+        for command in "bake scene.json -o out.exr" "voxelize scene.json -o out.vdb"; do
+            # shellcheck disable=SC2086 # words of a command
+            shade $command --quiet
+            [[ $name != none.obj ]] || refused 3 "scene.json: none.obj: No such file or directory"
+            [[ $name == none.obj ]] || refused 3 "scene.json: xxx" "xxx: File name too long"
+        done
+    done
 }

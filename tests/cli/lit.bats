@@ -1,8 +1,6 @@
 # A .glb or .gltf as output: the mesh file with its light.
 load helper
 
-MODELS=$BATS_TEST_DIRNAME/../models
-
 # What is there, in one line, but for the cube and what Bats writes.
 files() {
     local name names=()
@@ -12,20 +10,13 @@ files() {
     echo "${names[@]}"
 }
 
-# The JSON of a GLB.
-json_of() {
-    local length
-    length=$(od -An -tu4 -j12 -N4 "$1" | tr -d ' ')
-    tail -c +21 "$1" | head -c "$length"
-}
-
 BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
 
 @test "a mesh comes back as GLB with AO as occlusion and its light as lightmap" {
     succeed bake "$MODELS/scene.glb" "${BAKE[@]}" -o lit.glb
-    [[ $stderr == *"lit.glb: 32 × 32, "*" texels"* ]] || fail "$stderr"
-    json_of lit.glb | grep -q '"occlusionTexture":{"index":0,"texCoord":1}' || fail "no occlusion"
-    json_of lit.glb | grep -q '"MOZ_lightmap":{"index":1,"texCoord":1,"intensity":3.' || fail "no lightmap"
+    says "lit.glb: 32 × 32, " " texels"
+    show_gltf lit.glb text | grep -q '"occlusionTexture":{"index":0,"texCoord":1}' || fail "no occlusion"
+    show_gltf lit.glb text | grep -q '"MOZ_lightmap":{"index":1,"texCoord":1,"intensity":3.' || fail "no lightmap"
     [ "$(files)" = lit.glb ] || fail "$(files) beside it"
     info_tells lit.glb "2, in 3 meshes, 16 triangles; UV sets: 2"
 }
@@ -35,21 +26,21 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
         --exr all.exr
     [ "$(files '*')" = "all.exr lit.bin lit.gltf lit.lightmap.png lit.occlusion.png" ] || fail "$(files)"
     shade bake "$MODELS/scene.gltf" "${BAKE[@]}" --irradiance --ambient 0.2,0.2,0.2 -o image.exr
-    same_values all.exr image.exr || fail "the EXR is another"
+    same all.exr image.exr
 }
 
 @test "--preview writes unlit base colour; other formats become GLB" {
     for model in scene.glb scene.fbx scene.dae figure.fbx scene_draco.glb; do
         succeed bake "$MODELS/$model" "${BAKE[@]}" -o lit.glb --preview
-        json_of lit.glb | grep -q '"KHR_materials_unlit":{}' || fail "$model: no preview"
+        show_gltf lit.glb text | grep -q '"KHR_materials_unlit":{}' || fail "$model: no preview"
     done
     succeed bake box.obj "${BAKE[@]}" -o lit.glb
-    json_of lit.glb | grep -q '"TEXCOORD_0"' || fail "no UVs"
+    show_gltf lit.glb text | grep -q '"TEXCOORD_0"' || fail "no UVs"
 }
 
 @test "objects that do not receive keep their materials" {
     succeed bake "$MODELS/scene.glb" "${BAKE[@]}" --receive ell -o lit.glb
-    [ "$(json_of lit.glb | grep -o '"occlusionTexture"' | wc -l)" -eq 1 ] || fail "$(json_of lit.glb)"
+    [ "$(show_gltf lit.glb text | grep -o '"occlusionTexture"' | wc -l)" -eq 1 ] || fail "$(show_gltf lit.glb text)"
 }
 
 @test "any number of threads makes the same file" {
@@ -68,16 +59,16 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     refuses 2 -- bake in.glb "${BAKE[@]}" --exr in.glb -o a.glb
     refuses 2 a.glb "32 bits" -- bake in.glb "${BAKE[@]}" --bits 32 -o a.glb
     refuses 2 a.glb pack -- bake in.glb "${BAKE[@]}" --pack R=ao -o a.glb
-    refuses 2 in.glb "the output is the input" -- bake in.glb "${BAKE[@]}" -o in.glb
+    refuses 2 in.glb "the output is also an input" -- bake in.glb "${BAKE[@]}" -o in.glb
     refuses 2 a.glb AO -- bake in.glb --sky y --size 32 -o a.glb
     [ "$(files)" = in.glb ] || fail "$(files)"
 }
 
-# sets FILE: "count of UV sets: those that materials of its document name".
-sets() {
-    local json
-    json=$(case $1 in *.glb) json_of "$1" ;; *) cat "$1" ;; esac)
-    echo "$(grep -o '"TEXCOORD_[0-9]*"' <<<"$json" | sort -u | wc -l): $(grep -o '"texCoord":[0-9]*' <<<"$json" | sort -u | grep -o '[0-9]*' | tr '\n' ' ')"
+# sets_are FILE COUNT [SET …]: the count of its UV sets, and those that its materials use.
+sets_are() {
+    local found
+    found=$(show_gltf "$1" 'len(set(re.findall("TEXCOORD_.", text)))' 'sorted(set(re.findall("texCoord\":(.)", text)))')
+    [ "$found" = "${*:2}" ] || fail "$1: $found"
 }
 
 @test "new UVs take the place of the lightmap set, or of a set made before, and of no others" {
@@ -85,42 +76,38 @@ sets() {
     local n
     for n in 1 2 3; do
         succeed bake lit$((n - 1)).glb "${BAKE[@]}" --unwrap always -o lit$n.glb
-        [ "$(sets lit$n.glb)" = "2: 1 " ] || fail "$n: $(sets lit$n.glb)"
+        sets_are lit$n.glb 2 1
         [[ $stderr != *TEXCOORD* ]] || fail "$stderr"
     done
     # what is lit by it can be baked as it is, to the light that was baked into it
     succeed bake lit3.glb "${BAKE[@]}" --uv-set 1 --unwrap never --irradiance -o again.exr
     # a lightmap that stays keeps its set
     for n in ao.glb ao2.glb; do
-        shade bake "$([ $n = ao.glb ] && echo lit1.glb || echo ao.glb)" --ao 1 --size 32 --unwrap always -o $n
-        done_well
-        [ "$(sets $n)" = "3: 1 2 " ] || fail "$(sets $n)"
-        [[ $stderr == *"textures that stay use TEXCOORD_1, so the lightmap's UVs are TEXCOORD_2"* ]] || fail "$stderr"
+        succeed bake "$([ $n = ao.glb ] && echo lit1.glb || echo ao.glb)" --ao 1 --size 32 --unwrap always -o $n
+        says "textures that stay use TEXCOORD_1, so the lightmap's UVs are TEXCOORD_2"
+        sets_are $n 3 1 2
     done
     # and when both are replaced one is enough
     succeed bake ao2.glb "${BAKE[@]}" --unwrap always -o both.glb
-    [ "$(sets both.glb)" = "2: 1 " ] || fail "$(sets both.glb)"
+    sets_are both.glb 2 1
     # sets made by a preview, by unwrap, and from another format
     succeed bake lit1.glb "${BAKE[@]}" --unwrap always --preview -o preview.glb
-    [ "$(sets preview.glb)" = "3: 1 2 " ] || fail "$(sets preview.glb)"
+    sets_are preview.glb 3 1 2
     "$VDBSHADE" unwrap "$MODELS/scene.glb" -o one.glb
     "$VDBSHADE" unwrap one.glb -o two.glb
-    [ "$(sets two.glb)" = "2: " ] || fail "$(sets two.glb)"
+    sets_are two.glb 2
     succeed bake "$MODELS/scene.fbx" "${BAKE[@]}" --unwrap always -o fbx.glb
-    [ "$(sets fbx.glb)" = "2: 1 " ] || fail "$(sets fbx.glb)"
+    sets_are fbx.glb 2 1
     # a later set without a mark of vdbshade
-    json_of ao.glb | grep -q '"vdbshade_uv_sets":\[1,2\]' || fail "no mark"
+    show_gltf ao.glb text | grep -q '"vdbshade_uv_sets":\[1,2\]' || fail "no mark"
     LC_ALL=C sed 's/vdbshade_uv_sets/somebody_s_sets_/g' ao.glb >other.glb
     succeed bake other.glb --ao 1 --size 32 --unwrap always -o more.glb
-    [ "$(sets more.glb)" = "4: 1 3 " ] || fail "$(sets more.glb)"
+    sets_are more.glb 4 1 3
 }
 
 # sizes FILE: bytes, then how many textures, images, samplers, buffer views and accessors it has.
 sizes() {
-    python3 -c 'import json, struct, sys
-data = open(sys.argv[1], "rb").read()
-root = json.loads(data[20:20 + struct.unpack("<I", data[12:16])[0]])
-print(len(data), *(len(root[name]) for name in ("textures", "images", "samplers", "bufferViews", "accessors")))' "$1"
+    show_gltf "$1" size $(printf 'len(root["%s"]) ' textures images samplers bufferViews accessors)
 }
 
 @test "an asset that is lit over and over keeps its size" {
@@ -144,9 +131,9 @@ print(len(data), *(len(root[name]) for name in ("textures", "images", "samplers"
         eight+=", \"TEXCOORD_$set\" : \1"
     done
     sed "s/\"TEXCOORD_1\" : \([0-9]*\)/$eight/" scene.gltf >free.gltf
-    [ "$(sets free.gltf)" = "8: " ] || fail "$(sets free.gltf)"
+    sets_are free.gltf 8
     succeed bake free.gltf --ao 1 --size 32 --unwrap always -o free.glb
-    [ "$(sets free.glb)" = "8: 1 " ] || fail "$(sets free.glb)"
+    sets_are free.glb 8 1
     sed 's/"doubleSided" : true/&, "emissiveTexture":{"index":0,"texCoord":1}/' free.gltf >eight.gltf
     old_output out.gltf
     shade bake eight.gltf --ao 1 --size 16384 --unwrap always --max-error 0.001 --quiet -o out.gltf # would take minutes
@@ -155,28 +142,24 @@ print(len(data), *(len(root[name]) for name in ("textures", "images", "samplers"
     succeed bake eight.gltf --ao 1 --size 32 --unwrap always -o out.exr
     sed 's/"material" : \([01]\)/"extras": {"vdbshade_uv_sets": [7]}, &/' eight.gltf >made.gltf
     succeed bake made.gltf --ao 1 --size 32 --unwrap always -o made.glb
-    [ "$(sets made.glb)" = "8: 1 7 " ] || fail "$(sets made.glb)"
+    sets_are made.glb 8 1 7
 }
 
 # material FILE: prints the set and transform of the first material's base colour, AO and light, and the sets of its primitives.
 material() {
-    json_of "$1" | python3 -c 'import json, sys
-root = json.load(sys.stdin)
-m = root["materials"][0]
-for info in (m["pbrMetallicRoughness"]["baseColorTexture"], m["occlusionTexture"], m["extensions"]["MOZ_lightmap"]):
-    transform = info.get("extensions", {}).get("KHR_texture_transform", {})
-    print(info.get("texCoord", 0), *transform.get("scale", ()), end="; ")
-print(*sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] if name[0] == "T"))'
+    show_gltf "$1" '"; ".join(" ".join(map(str, [info.get("texCoord", 0), *info.get("extensions", {}).get("KHR_texture_transform", {}).get("scale", [])]))
+                         for one in root["materials"][:1]
+                         for info in (one["pbrMetallicRoughness"]["baseColorTexture"], one["occlusionTexture"], one["extensions"]["MOZ_lightmap"])) + ";"' \
+        'sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] if name[0] == "T")'
 }
 
 @test "UVs that a packer made integers are baked as its textures see them" {
-    local unpack='{"scale":[0.000244140625,0.000244140625]}' # 1 / 4096
-    write_packed plain.gltf float ''
-    write_packed packed.gltf short "$unpack"
+    write_packed plain.gltf 5126 1
+    write_packed packed.gltf 5123 4096 '{"scale": [0.000244140625, 0.000244140625]}' # 1 / 4096
     for file in plain packed; do
         succeed bake $file.gltf "${BAKE[@]}" --unwrap never -o $file.exr
     done
-    same_values plain.exr packed.exr || fail "another image: $("$VDBSHADE" compare plain.exr packed.exr)"
+    same plain.exr packed.exr
     # an asset gets new UVs in a set of their own
     succeed bake packed.gltf "${BAKE[@]}" --size 64 -o anew.glb
     [ "$(material anew.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material anew.glb)"
@@ -185,7 +168,7 @@ print(*sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] 
     local moved="0 0.000244140625 0.000244140625; "
     [ "$(material own.glb)" = "$moved$moved${moved}TEXCOORD_0" ] || fail "$(material own.glb)"
     succeed bake own.glb "${BAKE[@]}" --unwrap never -o own.exr
-    same_values plain.exr own.exr || fail "the asset lit by its own UVs: another image"
+    same plain.exr own.exr
     # an OBJ has no transform, so its UVs include it
     succeed bake packed.gltf "${BAKE[@]}" --unwrap never -o own.obj
     grep -q '^vt 0.75 0.75$' own.obj || fail "$(grep '^vt' own.obj)"
@@ -195,8 +178,8 @@ print(*sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] 
     [ "$(material mixed.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material mixed.glb)"
 }
 
-# write_gltf NODES ACCESSOR BUFFER: a triangle, whose parts these are.
-write_gltf() {
+# write_triangle NODES ACCESSOR BUFFER: a triangle, whose parts these are.
+write_triangle() {
     cat >in.gltf <<EOF
 {"asset":{"version":"2.0"},"scenes":[{"nodes":[0]}],"nodes":[$1],"meshes":[{"primitives":[{"attributes":{"POSITION":0,"TEXCOORD_0":1}}]}],
 "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"$2},{"bufferView":1,"componentType":5126,"count":3,"type":"VEC2"}],
@@ -205,21 +188,15 @@ EOF
 }
 
 @test "hostile documents are refused in one line, and the old output stays" {
-    # 0 0 0, 1 0 0, 0 0 1; 0 0, 1 0, 0 1
-    awk 'BEGIN { z = "\\000\\000\\000\\000"; o = "\\000\\000\\200\\077"; print z z z o z z z z o z z o z z o }' >bytes
-    printf '%b' "$(sed 's/\\\([0-7]\)/\\0\1/g' bytes)" >good.bin
-    [ "$(wc -c <good.bin)" -eq 60 ]
+    perl -e 'print pack("f<15", 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 0, 1)' >good.bin
     head -c 40 good.bin >short.bin
-    write_gltf '{"mesh":0}' '' good.bin
+    write_triangle '{"mesh":0}' '' good.bin
     succeed bake in.gltf --ao 1 --size 32 -o out.glb
     old_output out.glb
     while IFS='|' read -r code nodes accessor buffer part; do
-        write_gltf "$nodes" "$accessor" "$buffer"
-        shade bake in.gltf --ao 1 --size 32 -o out.glb
-        [ "$status" -eq "$code" ] || fail "$part: $status: $stderr"
-        [ "${#stderr_lines[@]}" -eq 1 ] || fail "$part: $stderr"
-        [[ $stderr == *in.gltf*"$part"* ]] || fail "$part: $stderr"
-        [ "$(cat out.glb)" = old ] || fail "$part: the old output is gone"
+        write_triangle "$nodes" "$accessor" "$buffer"
+        refuses "$code" in.gltf "$part" -- bake in.gltf --ao 1 --size 32 -o out.glb
+        untouched out.glb
     done <<'EOF'
 2|{"mesh":0,"children":[0]}||good.bin|its own descendant
 2|{"children":[1]},{"mesh":0,"children":[0]}||good.bin|its own descendant
@@ -236,9 +213,7 @@ EOF
     node -e 'require("gltf-validator")' 2>/dev/null || skip "no gltf-validator"
     [ -n "${TEST_LIT:-}" ] || skip "no test_lit"
     mkdir kept
-    for test in "$TEST_LIT" "${TEST_LIT}_images" "${TEST_LIT}_again"; do
-        TMPDIR=$PWD VSH_LIT_KEEP=$PWD/kept "$test" >/dev/null 2>&1 || fail "$test"
-    done
+    TMPDIR=$PWD VSH_LIT_KEEP=$PWD/kept "$TEST_LIT" >/dev/null 2>&1 || fail "test_lit"
     for model in scene.glb scene.gltf figure.glb scene_draco.glb scene.fbx; do
         for kind in "" --preview; do
             # shellcheck disable=SC2086
@@ -278,9 +253,7 @@ EOF
 JSON
     succeed bake dark.json
     info_tells dark.occlusion.png "'Y': min 0.4"
-    shade info dark.lightmap.png
-    # 0.5 of 8 bits, in every texel
-    [[ $output == *"min 0.50196"*"max 0.50196"* ]] || fail "$output"
+    info_tells dark.lightmap.png "min 0.50196" "max 0.50196" # 0.5 of 8 bits, in every texel
 }
 
 @test "baked again over its own output, or beside files of its input, a glTF replaces only what is its own" {
@@ -303,9 +276,7 @@ JSON
     shade info lit.exr
     told=$(grep '^vdbshade_' <<<"$output" | grep -v '^vdbshade_rgb') # which is of the EXR's own picture
     [[ $told == *vdbshade_ao:* && $told == *vdbshade_input_0:\ sha256:*thin.glb* && $told == *"vdbshade_command: bake --ao 0.5"* ]] || fail "$told"
-    python3 -c 'import json, sys
-extras = json.load(open("lit.gltf"))["asset"]["extras"]
-print("\n".join("%s: %s" % one for one in extras.items()))' >extras
+    show_gltf lit.gltf '"\n".join("%s: %s" % one for one in root["asset"]["extras"].items())' >extras
     [ "$(cat extras)" = "$told" ] || fail "$(cat extras), not $told"
     # others' stay, and what an earlier bake has told goes
     sed -i 's/"extras": {/"extras": {"mine": [1], "vdbshade_old": "x",/' lit.gltf
@@ -313,10 +284,9 @@ print("\n".join("%s: %s" % one for one in extras.items()))' >extras
     latin=$(printf 'n\xe9.gltf')
     mv lit.gltf "$latin"
     succeed bake "$latin" --ao 0.2 --size 32 -o again.gltf
-    python3 -c 'import json, sys
-extras = json.load(open("again.gltf"))["asset"]["extras"]
-assert extras["mine"] == [1] and "vdbshade_old" not in extras and "--ao 0.2" in extras["vdbshade_command"], extras
-assert extras["vdbshade_input_0"].endswith("n?.gltf"), extras'
+    show_gltf again.gltf 'root["asset"]["extras"]' >extras
+    grep -q "'mine': \[1\].*'vdbshade_command': [^,]*--ao 0.2.*'vdbshade_input_0': [^,]*n?.gltf'" extras || fail "$(cat extras)"
+    ! grep -q vdbshade_old extras || fail "$(cat extras)"
     succeed bake "$ASSETS/thin.glb" --ao 0.5 --size 32 -o lit.obj
     grep -q '^# vdbshade_ao: ' lit.obj && grep -q '^# vdbshade_input_0: sha256' lit.obj || fail "$(head -9 lit.obj)"
 }

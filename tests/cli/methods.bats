@@ -1,9 +1,7 @@
-# What is baked where no method is named, what is said of it, and what voxels lose.
+# What is baked where no method is named, what is said of it, and what voxels lose; the accurate end: rays, adaptive, exact.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
+prepare() {
     write_fence fence.obj
 }
 
@@ -11,18 +9,15 @@ setup() {
 write_fence() {
     {
         printf 'o board\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nv -1 0 -1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\no pickets\n'
-        local n=5
-        for x in -0.8 -0.5 -0.2 0.1 0.4 0.7; do
-            for z in 0 0.01; do
-                for y in 0.1 0.9; do
-                    printf 'v %s %s %s\nv %s %s %s\n' "$x" "$y" "$z" "$(awk "BEGIN{print $x+0.1}")" "$y" "$z"
-                done
-            done
-            local a=$n b=$((n + 1)) c=$((n + 2)) d=$((n + 3)) e=$((n + 4)) f=$((n + 5)) g=$((n + 6)) h=$((n + 7))
-            printf 'f %d/1 %d/1 %d/1 %d/1\n' "$b" "$a" "$c" "$d" "$e" "$f" "$h" "$g" "$a" "$b" "$f" "$e" \
-                "$d" "$c" "$g" "$h" "$a" "$e" "$g" "$c" "$f" "$b" "$d" "$h"
-            n=$((n + 8))
-        done
+        awk 'BEGIN {
+            split("2 1 3 4 5 6 8 7 1 2 6 5 4 3 7 8 1 5 7 3 6 2 4 8", corner, " ")
+            for (n = 4; n < 52; n += 8) {
+                x = 0.3 * (n - 4) / 8 - 0.8
+                for (k = 0; k < 8; ++k) print "v", x + 0.1 * (k % 2), k % 4 < 2 ? 0.1 : 0.9, k < 4 ? 0 : 0.01
+                for (k = 1; k <= 24; k += 4)
+                    print "f", n + corner[k] "/1", n + corner[k + 1] "/1", n + corner[k + 2] "/1", n + corner[k + 3] "/1"
+            }
+        }'
     } >"$1"
 }
 
@@ -31,22 +26,16 @@ said() {
     sed -n "/\"$1\": {/,/}/s/.*\"$2\": \"\{0,1\}\([^\",]*\).*/\1/p" s.json
 }
 
-is_at_most() {
-    awk "BEGIN {exit !($1 <= $2)}" || fail "$1 > $2"
-}
-
 @test "with nothing said meshes are baked by exact, and it is said" {
-    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --stats s.json -o a.exr
-    [[ $stderr == *"shadow exact, AO exact, max error 0.02"* ]] || fail "$stderr"
+    succeed_saying "shadow exact, AO exact, max error 0.02" -- bake box.obj "${SMALL[@]}" --ao 0.5 --stats s.json -o a.exr
     for kind in shadow ao; do
         [ "$(said $kind method)" = exact ] || fail "$(cat s.json)"
-        is_at_most "$(said $kind estimated_rmse)" "$(said $kind max_error)"
+        holds "$(said $kind estimated_rmse) <= $(said $kind max_error)"
     done
     succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method exact --ao-method exact --quiet -o b.exr
     same_values a.exr b.exr
     info_tells a.exr "exact, max error 0.02, sobol"
-    shade bake box.obj "${SMALL[@]}" --ao 0.5 --dry-run -o c.exr
-    [[ $output == *"shadow exact, AO exact"* ]] || fail "$output"
+    succeed_printing "shadow exact, AO exact" -- bake box.obj "${SMALL[@]}" --ao 0.5 --dry-run -o c.exr
 }
 
 @test "a level set alone is baked by adaptive" {
@@ -63,27 +52,24 @@ JSON
 }
 
 @test "an error that a limit of rays does not keep is told" {
-    succeed bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 --rays 8 \
-        --stats s.json -o a.exr
-    [[ $stderr == *"above the limit of 0.003: 8 rays are too few"* ]] || fail "$stderr"
-    is_at_most "$(said shadow max_error)" "$(said shadow estimated_rmse)"
+    succeed_saying "above the limit of 0.003: 8 rays are too few" -- bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 \
+        --sun-angle 20 --max-error 0.003 --rays 8 --stats s.json -o a.exr
+    holds "$(said shadow max_error) <= $(said shadow estimated_rmse)"
     succeed bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 --sun-angle 20 --max-error 0.003 \
         --stats s.json -o a.exr
     [[ $stderr != *"above the limit"* ]] || fail "$stderr"
-    is_at_most "$(said shadow estimated_rmse)" 0.003
+    holds "$(said shadow estimated_rmse) <= 0.003"
 }
 
 @test "what voxels leave of an error is measured, told, and by exact not there" {
-    succeed bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 \
-        --stats s.json -o a.exr
-    [[ $stderr == *"shadow: the estimated error is "*"above the limit of 0.01: "*"comes from voxels of"*"--method exact has none"* ]] ||
-        fail "$stderr"
+    succeed_saying "shadow: the estimated error is " "above the limit of 0.01: " "comes from voxels of" "--method exact has none" -- \
+        bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 --stats s.json -o a.exr
     [[ $stderr == *"estimated error: shadow "*"(the voxels' "* ]] || fail "$stderr"
-    is_at_most 0.05 "$(said shadow estimated_rmse)"
-    is_at_most 0.05 "$(said shadow field_rmse)"
+    holds "0.05 <= $(said shadow estimated_rmse)"
+    holds "0.05 <= $(said shadow field_rmse)"
     succeed bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --max-error 0.01 --stats s.json -o a.exr
     [[ $stderr != *"above the limit"* ]] || fail "$stderr"
-    is_at_most "$(said shadow estimated_rmse)" 0.01
+    holds "$(said shadow estimated_rmse) <= 0.01"
 }
 
 @test "any number of threads tells the same error" {
@@ -105,4 +91,60 @@ JSON
 @test "the project's scenes bake as they did" {
     succeed regress "$BATS_TEST_DIRNAME/../golden" --all --cache "$BATS_TEST_TMPDIR/cache.json"
     [ "$(grep -c ': alike$' <<<"$output")" -eq 15 ] || fail "not all cases"
+}
+
+# by_rays METHOD: a lone box by the method is lit, dark and open, and the file names the method's rays.
+by_rays() {
+    write_scene box.json box.obj '"sampler": "blue", "frame": 1'
+    no_sun "${SMALL[@]}"
+    succeed bake box.json "${rest[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --quiet \
+        --stats stats.json -o "$1.exr"
+    grep -q '"rays": [1-9]' stats.json || fail "no rays: $(cat stats.json)"
+    info_tells "$1.exr" "channel 'ao': min 1, mean 1, max 1" "channel 'shadow.sun': min 0, mean 0.5, max 1"
+    grep -qx "vdbshade_shadow: $1, .*8 rays, blue, frame 1" <<<"$output" || fail "what rays of shadows?"
+    grep -qx "vdbshade_ao: $1 within 0.5, .*8 rays, blue, frame 1" <<<"$output" || fail "what rays of AO?"
+}
+
+@test "rays, adaptive and exact bake, and name their rays" {
+    for method in rays adaptive exact; do
+        by_rays $method
+    done
+}
+
+@test "exact traces shapes and level sets as well as meshes" {
+    printf '{"casters": [{"sdf": {"shape": "torus", "radius": 0.6, "tube_radius": 0.2, "translate": [0, 2, 0]}}]}' >ring.json
+    "$VDBSHADE" voxelize ring.json --resolution 48 --quiet -o ring.vdb
+    cat >mixed.json <<'JSON'
+{"casters": [{"mesh": "box.obj"}, {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}, {"vdb": "ring.vdb"}],
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 5}],
+ "method": "exact", "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"}]}
+JSON
+    succeed_saying "no voxels" "shadow exact" -- bake mixed.json
+}
+
+@test "--error bakes what error is left, for methods that know it" {
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method cones --error --quiet -o out.exr
+    info_tells out.exr "channel 'error.sun'"
+    [[ $output != *"channel 'error.ao'"* ]] || fail "cones know no error"
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method adaptive --error --irradiance --quiet -o all.exr
+    shade info all.exr
+    for channel in shadow.sun ao error.sun error.ao irradiance.R A; do
+        [[ $output == *"channel '$channel'"* ]] || fail "no $channel"
+    done
+    [[ $output == *"11 channels"* ]] || fail "not 8 channels, and R, G and B"
+}
+
+@test "who asks for an error gets a method that keeps it" {
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --max-error 0.05 --quiet -o asked.exr
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --max-error 0.05 --method adaptive --ao-method adaptive --quiet -o named.exr
+    same_values asked.exr named.exr
+}
+
+@test "the statistics say what adaptive methods know of themselves" {
+    succeed bake box.obj "${SMALL[@]}" --method adaptive --quiet --stats stats.json -o out.exr
+    for key in rays refined certified_share estimated_rmse; do
+        grep -q "\"$key\": [0-9]" stats.json || fail "no $key: $(cat stats.json)"
+    done
+    succeed bake box.obj "${SMALL[@]}" --method cone --quiet --stats stats.json -o out.exr
+    grep -q '"estimated_rmse": null' stats.json
 }

@@ -1,11 +1,13 @@
-# A folder of a stranger's: files that never end, and names that lead out of it.
+# A folder of a stranger's: files that never end, and names and links that lead out of it. What the user names is followed.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
+# For outputs: a stranger's folder, and the user's.
+prepare() {
     old_output out.exr
-    models=$BATS_TEST_DIRNAME/../models
+    mkdir theirs elsewhere
+    write_box theirs/box.obj
+    write_output box.exr
+    old_output elsewhere/mine.exr
 }
 
 # Every run of the program must end by itself soon.
@@ -52,7 +54,7 @@ JSON
 }
 
 @test "a pipe that a model names is not waited for" {
-    cp "$models/scene.gltf" a.gltf
+    cp "$MODELS/scene.gltf" a.gltf
     mkfifo scene.bin a.mtl
     refuses 3 "scene.bin" "no regular file" -- info a.gltf
     { echo "mtllib a.mtl" && cat box.obj; } >a.obj
@@ -62,11 +64,11 @@ JSON
 
 @test "a model's files lie in its folder, but with --allow-outside" {
     mkdir inside
-    cp "$models/scene.bin" "$models/scene.mtl" .
-    sed 's,scene.bin,../scene.bin,' "$models/scene.gltf" >inside/a.gltf
+    cp "$MODELS/scene.bin" "$MODELS/scene.mtl" .
+    sed 's,scene.bin,../scene.bin,' "$MODELS/scene.gltf" >inside/a.gltf
     { echo "mtllib ../scene.mtl" && cat box.obj; } >inside/a.obj
-    sed "s,scene.bin,$PWD/scene.bin," "$models/scene.gltf" >inside/b.gltf
-    cp "$models/scene.gltf" inside/c.gltf
+    sed "s,scene.bin,$PWD/scene.bin," "$MODELS/scene.gltf" >inside/b.gltf
+    cp "$MODELS/scene.gltf" inside/c.gltf
     ln -s ../scene.bin inside/scene.bin
     local file trust
     for file in a.gltf a.obj b.gltf c.gltf; do
@@ -77,7 +79,7 @@ JSON
     done
     # where every file is a link to one store, the model's own place is as good
     mkdir links
-    cp "$models/scene.gltf" d.gltf
+    cp "$MODELS/scene.gltf" d.gltf
     ln -s ../d.gltf links/d.gltf
     ln -s ../scene.bin links/scene.bin
     succeed info links/d.gltf
@@ -85,10 +87,10 @@ JSON
 
 @test "nothing is told of a file outside that a model does not use" {
     mkdir inside
-    cp "$models/scene.bin" inside
+    cp "$MODELS/scene.bin" inside
     echo secret >secret
     sed -e 's|"buffers" : \[|&{"byteLength": 7, "uri": "../secret"},|' -e 's|"buffer" : 0|"buffer" : 1|' \
-        "$models/scene.gltf" >inside/a.gltf
+        "$MODELS/scene.gltf" >inside/a.gltf
     succeed info inside/a.gltf
     succeed bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always
     local hash
@@ -98,4 +100,90 @@ JSON
     ! grep -aq "secret" out.exr || fail "its name is told"
     succeed bake inside/a.gltf -o out.exr "${SMALL[@]}" --unwrap always --allow-outside
     grep -aq "${hash%% *}" out.exr || fail "it is not told where it is allowed"
+}
+
+# write_output OUTPUT: theirs/scene.json, which names the output.
+write_output() {
+    cat >theirs/scene.json <<JSON
+{"casters": [{"mesh": "box.obj"}], "resolution": 16, "method": "hard",
+ "lights": [{"name": "sun", "type": "directional", "direction": [0.2, 1, 0.1], "angle_deg": 5}],
+ "receivers": [{"mesh": "box.obj", "size": 16, "output": "$1"}]}
+JSON
+}
+
+# kept: nothing was written elsewhere, nor left behind.
+kept() {
+    [ "$(ls -A elsewhere)" = mine.exr ] || fail "elsewhere: $(ls -A elsewhere)"
+    untouched elsewhere/mine.exr
+}
+
+@test "an output that a scene names does not leave its folder by a link" {
+    ln -s ../elsewhere/mine.exr theirs/box.exr
+    shade bake theirs/scene.json
+    refused 3 "theirs/box.exr: cannot be written: a link leads from the folder of 'theirs/scene.json' to " elsewhere/mine.exr
+    kept
+    ln -sf ../elsewhere/new.exr theirs/box.exr # to nothing that is there
+    refuses 3 "theirs/box.exr: cannot be written: a link leads" -- bake theirs/scene.json
+    kept
+    ln -s "$PWD/elsewhere" theirs/sub
+    local one
+    for one in sub/mine.exr ./sub/../sub/new.exr; do
+        write_output "$one"
+        refuses 3 "a link leads" -- bake theirs/scene.json
+        kept
+        (cd theirs && run --separate-stderr "$VDBSHADE" bake scene.json && refused 3 "a link leads") || fail "from inside"
+        kept
+    done
+    write_output sub/made/x.exr
+    refuses 3 "a link leads" -- bake theirs/scene.json --per-object
+    kept
+}
+
+@test "a link that stays below the scene's folder, and one that the user names, are followed" {
+    mkdir theirs/bakes
+    ln -s bakes/kept.exr theirs/box.exr
+    old_output theirs/bakes/kept.exr
+    succeed bake theirs/scene.json --quiet
+    [ -L theirs/box.exr ] && [ "$(wc -c <theirs/bakes/kept.exr)" -gt 100 ] || fail "not followed"
+    ln -s elsewhere/mine.exr link.exr
+    succeed bake theirs/scene.json -o link.exr --quiet
+    [ -L link.exr ] && [ "$(wc -c <elsewhere/mine.exr)" -gt 100 ] || fail "the user's link"
+    write_output ../elsewhere/said.exr # openly elsewhere
+    succeed bake theirs/scene.json --quiet
+    [ -s elsewhere/said.exr ] || fail "not written"
+    write_output absent/x.exr
+    refuses 3 "there is no folder 'theirs/absent'" -- bake theirs/scene.json
+}
+
+@test "a scene of 2D does not write through a link" {
+    ln -s ../elsewhere/mine.exr theirs/flat.exr
+    cat >theirs/flat.json <<'JSON'
+{"region": [-1, -1, 1, 1], "size": 16, "output": "flat.exr",
+ "casters": [{"shape": "box", "half_size": [0.3, 0.1]}],
+ "lights": [{"name": "moon", "type": "directional", "direction": [1, 1], "angle_deg": 5}]}
+JSON
+    refuses 3 "theirs/flat.exr: cannot be written: a link leads" -- flat theirs/flat.json
+    kept
+}
+
+@test "a folder of scenes does not have its cache or golden bakes written elsewhere" {
+    old_output elsewhere/mine.exr
+    ln -s ../elsewhere/mine.exr theirs/.regress-cache.json
+    refuses 3 "theirs/.regress-cache.json: cannot be written: a link leads" -- regress theirs
+    kept
+    rm theirs/.regress-cache.json
+    ln -s ../elsewhere theirs/golden
+    shade regress theirs --update --quiet
+    [ "$status" -eq 3 ] && [[ $stderr == *"theirs/golden/box.exr: cannot be written: a link leads"* ]] || fail "folder"
+    kept
+    rm theirs/golden
+    mkdir theirs/golden
+    sed 's/0.2, 1, 0.1/1, 0.2, 0/' theirs/scene.json >theirs/other.json
+    "$VDBSHADE" bake theirs/other.json -o elsewhere/mine.exr --quiet
+    rm theirs/other.json
+    cp elsewhere/mine.exr mine.exr
+    ln -s ../../elsewhere/mine.exr theirs/golden/box.exr
+    shade regress theirs --update --quiet
+    [ "$status" -eq 3 ] && [[ $stderr == *"theirs/golden/box.exr: cannot be written: a link leads"* ]] || fail "file"
+    cmp mine.exr elsewhere/mine.exr
 }

@@ -1,65 +1,38 @@
 /* Pixels of PNG files, for tests. Usage: picture get FILE X Y …: "R G B" of each, 0 … 255, a line each;
  * picture put FILE WIDTH HEIGHT R G B …: a file of so many pixels, row by row from the top. */
 #include <png.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
-static int fail(const char *file, const char *why) {
-    fprintf(stderr, "%s: %s\n", file, why);
-    return 1;
-}
+static unsigned char pixels[1 << 24];
 
-static int get(const char *file, int count, char **numbers) {
-    png_image image = {.version = PNG_IMAGE_VERSION};
-    if (!png_image_begin_read_from_file(&image, file)) {
-        return fail(file, image.message);
-    }
-    image.format = PNG_FORMAT_RGB;
-    unsigned char *pixels = malloc(PNG_IMAGE_SIZE(image));
-    if (pixels == NULL || !png_image_finish_read(&image, NULL, pixels, 0, NULL)) {
-        free(pixels);
-        return fail(file, image.message);
-    }
-    for (int i = 0; i + 1 < count; i += 2) {
-        const unsigned long x = strtoul(numbers[i], NULL, 10), y = strtoul(numbers[i + 1], NULL, 10);
-        if (x >= image.width || y >= image.height) {
-            free(pixels);
-            return fail(file, "no such pixel");
-        }
-        const unsigned char *p = pixels + 3 * (y * image.width + x);
-        printf("%d %d %d\n", p[0], p[1], p[2]);
-    }
-    free(pixels);
-    return 0;
-}
-
-static int put(const char *file, int count, char **numbers) {
-    if (count < 2) {
-        return fail(file, "no size");
-    }
-    png_image image = {.version = PNG_IMAGE_VERSION,
-                       .width = (png_uint_32)strtoul(numbers[0], NULL, 10),
-                       .height = (png_uint_32)strtoul(numbers[1], NULL, 10),
-                       .format = PNG_FORMAT_RGB};
-    if ((size_t)(count - 2) != PNG_IMAGE_SIZE(image)) {
-        return fail(file, "another number of values");
-    }
-    unsigned char *pixels = malloc(PNG_IMAGE_SIZE(image));
-    for (int i = 2; pixels != NULL && i < count; ++i) {
-        pixels[i - 2] = (unsigned char)strtoul(numbers[i], NULL, 10);
-    }
-    const int written = pixels != NULL && png_image_write_to_file(&image, file, 0, pixels, 0, NULL);
-    free(pixels);
-    return written ? 0 : fail(file, image.message);
+static unsigned number(const char *text) {
+    return (unsigned)strtoul(text, NULL, 10);
 }
 
 int main(int argc, char **argv) {
-    if (argc > 4 && strcmp(argv[1], "get") == 0) {
-        return get(argv[2], argc - 3, argv + 3);
+    const bool puts = argv[1][0] == 'p';
+    png_image image = {.version = PNG_IMAGE_VERSION, .width = number(argv[3]), .height = number(argv[4])};
+    if (!puts && !png_image_begin_read_from_file(&image, argv[2])) {
+        return 1;
     }
-    if (argc > 4 && strcmp(argv[1], "put") == 0) {
-        return put(argv[2], argc - 3, argv + 3);
+    image.format = PNG_FORMAT_RGB;
+    if (PNG_IMAGE_SIZE(image) > sizeof pixels || (puts && PNG_IMAGE_SIZE(image) != (unsigned)argc - 5)) {
+        return 1;
     }
-    return fail("picture", "get FILE X Y … or put FILE WIDTH HEIGHT R G B …");
+    for (int i = 5; puts && i < argc; ++i) {
+        pixels[i - 5] = (unsigned char)number(argv[i]);
+    }
+    if (puts) {
+        return png_image_write_to_file(&image, argv[2], 0, pixels, 0, NULL) ? 0 : 1;
+    }
+    int failed = png_image_finish_read(&image, NULL, pixels, 0, NULL) ? 0 : 1;
+    for (int i = 3; failed == 0 && i + 1 < argc; i += 2) {
+        const unsigned x = number(argv[i]), y = number(argv[i + 1]);
+        failed = x < image.width && y < image.height ? 0 : 1;
+        const unsigned char *p = pixels + (failed == 0 ? 3 * (y * image.width + x) : 0);
+        printf("%d %d %d\n", p[0], p[1], p[2]);
+    }
+    return failed;
 }

@@ -1,18 +1,16 @@
+# What outputs tell of where they come from: `info` prints it, and nothing of it varies between two runs.
 load helper
 
-# What outputs tell of where they come from: `info` prints it, and nothing of it varies between two runs.
-
 @test "an EXR tells version, command, method, light, voxel size and the hash of its input" {
-    run -0 "$VDBSHADE" bake box.obj -o box.exr --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 \
+    succeed bake box.obj -o box.exr --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 \
         --method adaptive --max-error 0.1 --quiet
-    run -0 "$VDBSHADE" info box.exr
-    [[ $output == *"vdbshade_version: 0.2.0"* ]]
-    [[ $output == *"vdbshade_command: bake --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 --method adaptive --max-error 0.1 box.obj"* ]]
-    [[ $output == *"vdbshade_shadow: adaptive, max error 0.1, sobol"* ]]
-    [[ $output == *"vdbshade_ao: exact within 2, max error 0.1, sobol"* ]]
-    [[ $output == *"vdbshade_light_sun: directional towards 1 2 1, 5 degrees across"* ]]
-    [[ $output == *"vdbshade_voxel_size: 0.0625"* ]]
-    [[ $output == *"vdbshade_input_0: sha256:$(sha256sum <box.obj | cut -d' ' -f1) box.obj"* ]]
+    info_tells box.exr "vdbshade_version: 0.2.0" \
+        "vdbshade_command: bake --sun 1,2,1 --sun-angle 5 --ao 2 --size 32 --resolution 16 --method adaptive --max-error 0.1 box.obj" \
+        "vdbshade_shadow: adaptive, max error 0.1, sobol" \
+        "vdbshade_ao: exact within 2, max error 0.1, sobol" \
+        "vdbshade_light_sun: directional towards 1 2 1, 5 degrees across" \
+        "vdbshade_voxel_size: 0.0625" \
+        "vdbshade_input_0: sha256:$(sha256sum <box.obj | cut -d' ' -f1) box.obj"
 }
 
 # Writes OUT of a box from another folder, with other threads, zone and limits. COMMAND OUT INPUT [options]
@@ -25,10 +23,10 @@ again() {
 }
 
 @test "two runs give the same bytes: no date, no host, no path, no number of threads" {
-    run -0 "$VDBSHADE" bake --sun 1,2,1 --size 16 --resolution 16 --threads 1 box.obj -o a.exr --quiet
-    run -0 "$VDBSHADE" bake --sun 1,2,1 --size 16 --resolution 16 --threads 1 box.obj -o a.png --quiet
-    run -0 "$VDBSHADE" volume --sun 1,2,1 --resolution 16 --threads 1 box.obj -o a.vdb --quiet
-    run -0 "$VDBSHADE" voxelize --resolution 16 --threads 1 box.obj -o v.vdb --quiet
+    succeed bake --sun 1,2,1 --size 16 --resolution 16 --threads 1 box.obj -o a.exr --quiet
+    succeed bake --sun 1,2,1 --size 16 --resolution 16 --threads 1 box.obj -o a.png --quiet
+    succeed volume --sun 1,2,1 --resolution 16 --threads 1 box.obj -o a.vdb --quiet
+    succeed voxelize --resolution 16 --threads 1 box.obj -o v.vdb --quiet
     again bake b.exr "$PWD/box.obj" --sun 1,2,1 --size 16
     again bake b.png ../box.obj --sun 1,2,1 --size 16
     again volume b.vdb ../box.obj --sun 1,2,1
@@ -45,16 +43,15 @@ again() {
  "position": [2, 3, 1], "radius": 0.25}], "receivers": [{"mesh": "box.obj", "output": "box.exr", "size": 16}],
  "resolution": 16}
 JSON
-    run -0 "$VDBSHADE" bake scene.json --quiet
-    run -0 "$VDBSHADE" info box.exr
-    [[ $output == *"vdbshade_command: bake scene.json"* ]]
-    [[ $output == *"vdbshade_light_key: sphere at 2 3 1, radius 0.25"* ]]
-    [[ $output == *"vdbshade_input_0: sha256:$(sha256sum <scene.json | cut -d' ' -f1) scene.json"* ]]
-    [[ $output == *"vdbshade_input_1: sha256:$(sha256sum <box.obj | cut -d' ' -f1) box.obj"* ]]
+    succeed bake scene.json --quiet
+    info_tells box.exr "vdbshade_command: bake scene.json" \
+        "vdbshade_light_key: sphere at 2 3 1, radius 0.25" \
+        "vdbshade_input_0: sha256:$(sha256sum <scene.json | cut -d' ' -f1) scene.json" \
+        "vdbshade_input_1: sha256:$(sha256sum <box.obj | cut -d' ' -f1) box.obj"
 }
 
 @test "words that a shell would split are quoted" {
     write_box "my box.obj"
-    run -0 "$VDBSHADE" bake "my box.obj" -o box.exr --sun 1,2,1 --size 16 --resolution 16 --quiet
+    succeed bake "my box.obj" -o box.exr --sun 1,2,1 --size 16 --resolution 16 --quiet
     info_tells box.exr "--resolution 16 'my box.obj'"
 }

@@ -2,8 +2,7 @@
 load helper
 
 # The seeds' scene, coarse, and points over its floor.
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
+prepare() {
     sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >scene.json
     ln -s "$(cd "$ASSETS" && pwd)/seeds_floor.obj" .
     QUERY=(query scene.json --ao-method taps --quiet)
@@ -61,8 +60,7 @@ int main(int argc, char **argv) {
     return 0;
 }
 C
-    build=$(dirname "$(realpath "$VDBSHADE")")
-    "${CC:-cc}" -std=gnu11 -O1 ${CFLAGS-} -I"$BATS_TEST_DIRNAME/../../include" api.c -L"$build" -lvdbshade -Wl,-rpath,"$build" -o api
+    compile api
     ./api "$1"
 }
 
@@ -135,8 +133,7 @@ ANSWERS=(--distance --gradient --answers-only)
 
 @test "without normals there is no ao, and no horizon" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
-    succeed query scene.json --points p.csv -o out.csv
-    [[ $stderr == *"the points have no normals, so AO is left out"* ]] || fail "no warning"
+    succeed_saying "the points have no normals, so AO is left out" -- query scene.json --points p.csv -o out.csv
     [ "$(head -1 out.csv)" = x,y,z,shadow.sun ]
     refuses 2 p.csv normals --ao -- "${QUERY[@]}" --ao 0.5 --points p.csv -o other.csv
     printf '{"casters": [{"sdf": {"shape": "sphere", "radius": 1}}], "voxel_size": 0.1}' >bare.json
@@ -183,10 +180,8 @@ CSV
     succeed "${QUERY[@]}" --method cone --points good.csv -o good.out --format csv
     [ -z "$stderr" ] || fail "a clean input is nothing to speak of"
     succeed "${QUERY[@]}" --method cone --points bad.csv -o bad.out --format csv --stats stats.json
-    for line in "row 2: 2 columns" "row 3: column 2 is '0,001'" "row 5: x is not finite" "row 6: the normal is zero" \
-        "row 8: column 2 is ''" "6 of 9 rows are bad"; do
-        [[ $stderr == *"bad.csv: $line"* ]] || fail "says not: $line"
-    done
+    says "bad.csv: row 2: 2 columns" "bad.csv: row 3: column 2 is '0,001'" "bad.csv: row 5: x is not finite" \
+        "bad.csv: row 6: the normal is zero" "bad.csv: row 8: column 2 is ''" "bad.csv: 6 of 9 rows are bad"
     [[ $stderr != *"row 9"* ]] || fail "more than five are told"
     grep -q '"bad_rows": 6' stats.json && grep -q '"points": 9' stats.json
     [ "$(wc -l <bad.out)" -eq 10 ]
@@ -197,11 +192,9 @@ CSV
     perl -e 'print pack("f<6", @$_, 0.5, 0, 1, 0) for [0.5, 0.001], [9**9**9, 1], [0.5, 0.001];
         print pack("f<6", 1, 2, 3, 0, 0, 0), pack("f<6", 1, 2, 3, 0, -sin(9**9**9), 0)' >bad.raw
     succeed "${QUERY[@]}" --points bad.raw --normals yes -o bad.ply
-    for line in "row 2: x is not finite" "row 4: the normal is zero" "row 5: ny is not finite" "3 of 5 rows are bad"; do
-        [[ $stderr == *"bad.raw: $line"* ]] || fail "says not: $line"
-    done
-    shade "${QUERY[@]}" --points bad.ply --answers-only -o again.csv
-    [[ $stderr == *"bad.ply: 3 of 5 rows are bad"* ]] || fail "PLY"
+    says "bad.raw: row 2: x is not finite" "bad.raw: row 4: the normal is zero" "bad.raw: row 5: ny is not finite" \
+        "bad.raw: 3 of 5 rows are bad"
+    succeed_saying "bad.ply: 3 of 5 rows are bad" -- "${QUERY[@]}" --points bad.ply --answers-only -o again.csv
     [ "$(grep -c '^nan,nan$' again.csv)" -eq 3 ]
     old_output strict.csv
     refuses 2 "row 2: 2 columns" -- "${QUERY[@]}" --points bad.csv -o strict.csv --strict
@@ -267,8 +260,6 @@ write_binary_ply() {
     succeed "${QUERY[@]}" --points p.raw --normals yes -o out.ply
     "$VDBSHADE" "${QUERY[@]}" --points - --points-format raw --normals yes --format ply -o - <p.raw | cmp - out.ply
     grep -aq '^element vertex 1000$' out.ply
-    shade info out.ply
-    [[ $output == *"1000 vertices"* || $stderr == *"no faces"* || $status -eq 2 ]] || fail "not read"
     shade "${QUERY[@]}" --points out.ply --normals yes --answers-only -o a.raw
     shade "${QUERY[@]}" --points p.raw --normals yes --answers-only -o b.raw
     cmp a.raw b.raw
@@ -292,17 +283,14 @@ write_binary_ply() {
     printf 'ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nend_header\n1 2\n' >flat.ply
     points 3 | head -c 50 >cut.raw
     printf 'a,b,c\n1,2,3\n' >none.csv
-    local file code what
-    while read -r file code what; do
-        refuses "$code" "$file" "$what" -- "${QUERY[@]}" --points "$file" --normals yes -o out.ply
-    done <<'CASES'
-head.ply 3 end_header
-rows.ply 3 vertex 3 of 4
-magic.ply 2 line 1
-middle.ply 2 binary_middle_endian
-flat.ply 2 'z'
-cut.raw 3 row 3
-none.csv 2 column x
+    refuse_each "${QUERY[@]}" --normals yes -o out.ply --points <<'CASES'
+3 head.ply end_header | head.ply
+3 rows.ply 'vertex 3 of 4' | rows.ply
+2 magic.ply 'line 1' | magic.ply
+2 middle.ply binary_middle_endian | middle.ply
+2 flat.ply "'z'" | flat.ply
+3 cut.raw 'row 3' | cut.raw
+2 none.csv 'column x' | none.csv
 CASES
     untouched out.ply
 }
@@ -314,8 +302,7 @@ CASES
     write_ascii_ply | sed 's/^element vertex 4/element vertex 0/; s/^element face 2/element face 0/; /^end_header/q' >empty.ply
     for points in empty.csv empty.raw head.csv empty.ply; do
         for format in csv ply raw; do
-            shade "${QUERY[@]}" --points "$points" --normals yes -o "out.$format"
-            done_well || fail "$points to $format"
+            succeed "${QUERY[@]}" --points "$points" --normals yes -o "out.$format"
         done
     done
     grep -aq '^element vertex 0$' out.ply
@@ -351,44 +338,38 @@ CASES
 
 @test "a pipe or disk that takes no more ends the run" {
     points 40000 >p.raw
-    run bash -c '"$0" "${@}" --points p.raw --normals yes --format csv -o - 2>err.txt | head -1; exit "${PIPESTATUS[0]}"' \
-        "$VDBSHADE" "${QUERY[@]}"
+    QUERY+=(--points p.raw --normals yes)
+    run bash -c '"$0" "${@}" --format csv -o - 2>err.txt | head -1; exit "${PIPESTATUS[0]}"' "$VDBSHADE" "${QUERY[@]}"
     [ "$status" -eq 141 ] || [ "$status" -eq 3 ] || fail "status"
     [ "${lines[0]}" = "x,y,z,nx,ny,nz,shadow.sun,ao" ]
     [ ! -e /dev/full ] || {
-        run bash -c '"$0" "${@}" --points p.raw --normals yes -o - 2>err.txt >/dev/full' "$VDBSHADE" "${QUERY[@]}"
+        run bash -c '"$0" "${@}" -o - 2>err.txt >/dev/full' "$VDBSHADE" "${QUERY[@]}"
         [ "$status" -eq 3 ]
         grep -q 'standard output: cannot be written' err.txt
     }
-    run bash -c '"$0" "${@}" --points p.raw --normals yes -o - 2>err.txt >&-' "$VDBSHADE" "${QUERY[@]}"
+    run bash -c '"$0" "${@}" -o - 2>err.txt >&-' "$VDBSHADE" "${QUERY[@]}"
     [ "$status" -eq 3 ]
     old_output out.raw
-    run bash -c 'ulimit -f 16; "$0" "${@}" --points p.raw --normals yes -o out.raw 2>err.txt' "$VDBSHADE" "${QUERY[@]}"
+    run bash -c 'ulimit -f 16; "$0" "${@}" -o out.raw 2>err.txt' "$VDBSHADE" "${QUERY[@]}"
     [ "$status" -eq 3 ] || fail "$(cat err.txt)"
     untouched out.raw
 }
 
 @test "what is wrong on the command line is said" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
-    local words options
-    while IFS='|' read -r words options; do
-        # shellcheck disable=SC2086 # words
-        shade query scene.json $options
-        # shellcheck disable=SC2086 # words
-        refused $words
-    done <<'CASES'
-2 --points|-o out.csv
-2 -o OUT|--points p.csv
-2 --points-format|--points - -o -
-2 out.dat --format|--points p.csv -o out.dat
-2 exr csv, ply, raw|--points p.csv --format exr -o out.dat
-2 maybe yes or no|--points p.csv --normals maybe -o out.csv
-2 --batch|--points p.csv --batch 0 -o out.csv
-2 p.csv|--points p.csv -o p.csv
-2 scene.json|--points p.csv -o scene.json --format csv
-3 none.csv|--points none.csv -o out.csv
-3 folder|--points . --points-format csv -o out.csv
-2 --error|--points p.csv --method cone --ao-method cones --error -o out.csv
+    refuse_each query scene.json <<'CASES'
+2 --points | -o out.csv
+2 '-o OUT' | --points p.csv
+2 --points-format | --points - -o -
+2 out.dat --format | --points p.csv -o out.dat
+2 exr csv | --points p.csv --format exr -o out.dat
+2 maybe yes no | --points p.csv --normals maybe -o out.csv
+2 --batch | --points p.csv --batch 0 -o out.csv
+2 p.csv | --points p.csv -o p.csv
+2 scene.json | --points p.csv -o scene.json --format csv
+3 none.csv | --points none.csv -o out.csv
+3 folder | --points . --points-format csv -o out.csv
+2 --error | --points p.csv --method cone --ao-method cones --error -o out.csv
 CASES
     [ ! -e out.csv ]
 }

@@ -5,45 +5,49 @@ setup_file() {
     "${CC:-cc}" -shared -fPIC -O1 "$BATS_TEST_DIRNAME/../preload/calls.c" -o "$BATS_FILE_TMPDIR/calls.so" -ldl
 }
 
-setup() {
+prepare() {
     unless_sanitized "a sanitizer must be loaded before the library that refuses"
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
     calls=$BATS_FILE_TMPDIR/calls.so
-    bake=("$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o out.exr)
+    bake=(bake box.obj "${SMALL[@]}" --quiet -o out.exr)
 }
 
 @test "too few descriptors are told as such, with the way to do without" {
     old_output out.exr
     local most
     for most in 10 12 14 16; do
-        run --separate-stderr bash -c 'ulimit -n "$1"; shift; exec "$@"' bash "$most" "${bake[@]}"
+        limited "-n $most" "${bake[@]}"
         [ "$status" -eq 4 ] || [ "$status" -eq 0 ] || fail "$most"
-        [ "$status" -eq 0 ] || refused 4 "box.obj: no process to read it in: " "Too many open files" --sandbox off
+        [ "$status" -eq 0 ] || refused 4 "box.obj: cannot start the process that reads it, " "Too many open files" --sandbox off
         [ "$status" -eq 0 ] || untouched out.exr
     done
-    run --separate-stderr bash -c 'ulimit -n 16; exec "$@"' bash "${bake[@]}" --sandbox off
+    limited "-n 16" "${bake[@]}" --sandbox off
     done_well
 }
 
-@test "a system without memfd_create is told with the way to do without" {
+@test "a system without memfd_create, and one that gives fewer threads than OpenVDB's libraries begin, are told" {
     old_output out.exr
-    LD_PRELOAD=$calls REFUSE_MEMFD=1 run --separate-stderr "${bake[@]}"
-    refused 4 "box.obj: no process to read it in: " "Function not implemented" --sandbox off
+    LD_PRELOAD=$calls REFUSE_MEMFD=1 shade "${bake[@]}"
+    refused 4 "box.obj: cannot start the process that reads it, " "Function not implemented" --sandbox off
     untouched out.exr
+    local most
+    for most in 1 3; do
+        LD_PRELOAD=$calls REFUSE_THREADS=$most shade "${bake[@]}"
+        refused 4 "threads: the system refuses the 4 that OpenVDB's libraries begin"
+        untouched out.exr
+    done
 }
 
 @test "where the system gives fewer threads the bake is the same, with a note" {
-    "${bake[@]}" --threads 1
+    "$VDBSHADE" "${bake[@]}" --threads 1
     mv out.exr one.exr
     local most
     for most in 5 6 8 10; do # four are liblog4cplus' (OpenVDB's); a reader counts for itself
-        LD_PRELOAD=$calls REFUSE_THREADS=$most run --separate-stderr "$VDBSHADE" bake box.obj "${SMALL[@]}" -o out.exr \
+        LD_PRELOAD=$calls REFUSE_THREADS=$most shade bake box.obj "${SMALL[@]}" -o out.exr \
             --threads 12 --verbose
         done_well
-        [[ $stderr == *"the system gives this process fewer threads than asked for ("*" at a time)"* ]] || fail "$most"
+        says "the system gives this process fewer threads than asked for (" " at a time)"
         same_values one.exr out.exr
-        LD_PRELOAD=$calls REFUSE_THREADS=$most run --separate-stderr "$VDBSHADE" volume box.obj --sun 0,1,0 \
+        LD_PRELOAD=$calls REFUSE_THREADS=$most shade volume box.obj --sun 0,1,0 \
             --resolution 24 -o out.vdb --threads 12
         done_well
     done
@@ -52,28 +56,15 @@ setup() {
 @test "threads that were joined and count for a while yet are waited for" {
     local most
     for most in 6 8 16; do
-        LD_PRELOAD=$calls REFUSE_THREADS=$most LINGER=200 run --separate-stderr "${bake[@]}" --threads 8
-        done_well
-    done
-}
-
-@test "where it gives fewer than OpenVDB's libraries begin, that is said" {
-    old_output out.exr
-    local most
-    for most in 1 3; do
-        LD_PRELOAD=$calls REFUSE_THREADS=$most run --separate-stderr "${bake[@]}"
-        refused 4 "threads: the system refuses the 4 that OpenVDB's libraries begin"
-        untouched out.exr
+        LD_PRELOAD=$calls REFUSE_THREADS=$most LINGER=200 succeed "${bake[@]}" --threads 8
     done
 }
 
 @test "where it refuses the memory that OpenVDB or OpenImageIO take, that is said" {
     local most refused=0
-    write_box box.obj
     for most in 40 60 80 100 120 140 160 200; do
         for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.tif"; do
-            run --separate-stderr bash -c 'ulimit -d "$1"; shift; exec "$@"' bash $((most * 1000)) "$VDBSHADE" ${what%% *} \
-                box.obj ${what#* } --sandbox off --threads 1 --quiet
+            limited "-d $((most * 1000))" ${what%% *} box.obj ${what#* } --sandbox off --threads 1 --quiet
             [ "$status" -eq 0 ] || [ "$status" -eq 4 ] || fail "$most MB, $what"
             [[ $stderr != *"the system refused the "*" MB that libvdbshade_"* ]] || refused=$((refused + 1))
         done
@@ -96,7 +87,7 @@ setup() {
             mv "$out" "whole.${out##*.}"
             for ((n = 1; n < 3000; n += 1 + n)); do
                 old_output "$out"
-                LD_PRELOAD=$calls VSH_TEST_PROGRAM=$program VSH_TEST_MALLOC=$n run --separate-stderr "$VDBSHADE" "${words[@]}"
+                LD_PRELOAD=$calls VSH_TEST_PROGRAM=$program VSH_TEST_MALLOC=$n shade "${words[@]}"
                 if [ "$status" -eq 0 ]; then
                     cmp -s "$out" "whole.${out##*.}" || same_values "$out" "whole.${out##*.}" || fail "$n of $program $what"
                     continue
@@ -116,7 +107,7 @@ setup() {
     name=$(printf 'x%.0s' {1..256})
     mkdir closed
     for name in "$name" /proc/stats.json closed; do
-        run --separate-stderr "${bake[@]}" --stats "$name"
+        shade "${bake[@]}" --stats "$name"
         refused 3 "$name: cannot be written: "
         untouched out.exr
     done
@@ -159,12 +150,12 @@ synced() {
     done
     for long in "$name" "$name$name$name"; do
         for one in obj exr vdb json; do
-            run --separate-stderr "$VDBSHADE" info "begin/${long}x.$one"
+            shade info "begin/${long}x.$one"
             refused 3 "begin/ddd" "x.$one: " "No such file or directory"
         done
-        run --separate-stderr "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o "begin/${long}x.exr"
+        shade bake box.obj "${SMALL[@]}" --quiet -o "begin/${long}x.exr"
         refused 3 "begin/ddd" "x.exr: cannot be written: "
-        run --separate-stderr "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o out.exr --stats "begin/${long}x.json"
+        shade bake box.obj "${SMALL[@]}" --quiet -o out.exr --stats "begin/${long}x.json"
         refused 3 "begin/ddd" "x.json: cannot be written: "
     done
 }

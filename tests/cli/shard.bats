@@ -1,11 +1,42 @@
-# `bake --shard I/N` and `merge`: parts that are baked by themselves come to the bits of one bake.
-load parts
+# `bake --shard I/N` and `merge`: parts that are baked by themselves come to the bits of one bake. What is wrong with parts, which may be
+# of strangers, is named.
+load helper
+
+prepare() {
+    ln -s "$ASSETS/terrain.png" "$ASSETS/cloister.glb" .
+}
+
+CLOISTER=(cloister.glb --sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --size 64x256)
+
+# parts OUT N "I …" INPUT [options]: bakes all parts, or those that are named.
+parts() {
+    local out=$1 n=$2 which=${3:-$(seq "$2")} i
+    shift 3
+    for i in $which; do
+        "$VDBSHADE" bake "$@" -o "$out" --shard "$i/$n" --quiet
+    done
+}
+
+# one_is OUT "N …" INPUT [options]: each number of parts comes to what one bake does, which stays in one/.
+one_is() {
+    local out=$1 n
+    mkdir -p one
+    "$VDBSHADE" bake "${@:3}" -o "one/$out" --quiet
+    for n in $2; do
+        parts "$out" "$n" "" "${@:3}"
+        "$VDBSHADE" merge "$out" --quiet
+        cmp "one/$out" "$out" || fail "$n parts of ${*:3} are not one bake"
+        rm -- "$out" *.part
+    done
+}
+
+# values OUT: the last rows and the statistics of a part, without its checksum.
+values() {
+    tail -c 50008 "$1.2-of-3.part" | head -c 50000
+}
 
 @test "2, 3, 7 and 64 parts of a lightmap are one bake, byte by byte" {
-    one out.exr "${CLOISTER[@]}"
-    for n in 2 3 7 64; do
-        merged out.exr "$n" "${CLOISTER[@]}"
-    done
+    one_is out.exr "2 3 7 64" "${CLOISTER[@]}"
     no_leftovers
 }
 
@@ -13,14 +44,10 @@ load parts
     local options=(--irradiance --bent-normals world --sky y --error)
     write_scene all.json "${CLOISTER[0]}" '"invalid": true, "tint": "quadratic"'
     no_sun "${CLOISTER[@]:1}"
-    one out.exr all.json "${rest[@]}" "${options[@]}" --padding auto
-    merged out.exr 3 all.json "${rest[@]}" "${options[@]}" --padding auto
-    one out.png "${CLOISTER[@]}" --seams fix --padding auto
-    merged out.png 3 "${CLOISTER[@]}" --seams fix --padding auto
-    one out.exr "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
-    merged out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
-    one out.exr "${CLOISTER[@]}" --method cone --ao-method cones --padding 0 --resolution 48
-    merged out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --padding 0 --resolution 48
+    one_is out.exr 3 all.json "${rest[@]}" "${options[@]}" --padding auto
+    one_is out.png 3 "${CLOISTER[@]}" --seams fix --padding auto
+    one_is out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
+    one_is out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --padding 0 --resolution 48
 }
 
 @test "AO that texels share is shot by one part and finished by merge, of any spacing and error, with its error" {
@@ -31,10 +58,7 @@ load parts
     no_sun "${CLOISTER[@]:1}"
     for options in "8.json --error" "2.json --max-error 0.05" "4.json --max-error 0.008" \
         "4.json --method adaptive --ao-method adaptive --resolution 48 --error"; do
-        one out.exr $options "${rest[@]}"
-        for n in 2 5; do
-            merged out.exr "$n" $options "${rest[@]}"
-        done
+        one_is out.exr "2 5" $options "${rest[@]}"
     done
 }
 
@@ -42,26 +66,16 @@ load parts
     local all=(--irradiance --ambient 0.3,0.2,0.1 --bent-normals tangent --sky -z --error)
     for options in "--irradiance --max-error 0.05" "--irradiance --ambient 0.3,0.2,0.1" "--bent-normals world" "--sky y --seams fix" \
         "${all[*]} --padding 20" "--irradiance --bent-normals tangent --sky y --method adaptive --ao-method adaptive --resolution 48"; do
-        one out.exr "${CLOISTER[@]}" $options
-        for n in 2 5; do
-            merged out.exr "$n" "${CLOISTER[@]}" $options
-        done
+        one_is out.exr "2 5" "${CLOISTER[@]}" $options
     done
-    one out.glb "${CLOISTER[@]}" "${all[@]}"
-    for n in 2 7 64; do
-        merged out.glb "$n" "${CLOISTER[@]}" "${all[@]}"
-    done
+    one_is out.glb "2 7 64" "${CLOISTER[@]}" "${all[@]}"
 }
 
 @test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
-    one out.glb "${CLOISTER[@]}"
-    merged out.glb 3 "${CLOISTER[@]}"
+    one_is out.glb 3 "${CLOISTER[@]}"
     printf '%s' '{"lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
         "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 64, "output": "out.exr"}]}' >terrain.json
-    one out.exr terrain.json
-    for n in 2 3 7 64; do
-        merged out.exr "$n" terrain.json
-    done
+    one_is out.exr "2 3 7 64" terrain.json
     printf '%s' '{"casters": [{"mesh": "cloister.glb"}], "resolution": 48, "ao": {"distance": 2}, "receivers": [
         {"mesh": "cloister.glb", "size": 64, "output": "a.exr"}, {"mesh": "cloister.glb", "size": 96, "output": "b.png"}]}' >two.json
     "$VDBSHADE" bake two.json --quiet
@@ -84,10 +98,8 @@ load parts
 
 @test "seams between pages are fixed where parts are put together, too, and objects have their own" {
     local ring=("$ASSETS/smooth.glb" --unwrap always --texels-per-unit 30 --size 128 --sun 0.5,0.5,0.1 --sun-angle 20 --ao 0.3) # a ring on two pages
-    one out.glb "${ring[@]}"
-    merged out.glb 3 "${ring[@]}"
-    one out.glb "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --per-object
-    merged out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --per-object
+    one_is out.glb 3 "${ring[@]}"
+    one_is out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --per-object
 }
 
 @test "a part is the same whoever bakes it, with however many threads" {
@@ -100,7 +112,7 @@ load parts
 
 @test "a lightmap that memory has no room for is merged to the same bits" {
     options=("${CLOISTER[@]}" --size 2048x128 --irradiance --bent-normals tangent --sky y --error)
-    one out.exr "${options[@]}"
+    one_is out.exr "" "${options[@]}"
     parts out.exr 3 "" "${options[@]}"
     local sizes
     mapfile -t sizes < <(stat -c %s out.exr.?-of-3.part | sort -n)
@@ -110,7 +122,7 @@ load parts
 }
 
 @test "statistics, pictures of what is invalid, and pages are made of all parts" {
-    one out.exr "${CLOISTER[@]}" --sky y --stats one.json --invalid one.png
+    one_is out.exr "" "${CLOISTER[@]}" --sky y --stats one.json --invalid one.png
     parts out.exr 3 "" "${CLOISTER[@]}" --sky y
     "$VDBSHADE" merge out.exr --quiet --stats all.json --invalid all.png
     for key in texels invalid_texels marches rays voxel_size estimated_rmse worst_error; do # of all, of shadow, AO and the sky
@@ -130,4 +142,75 @@ load parts
         most=$((own > most ? own : most)) least=$((own < least ? own : least))
     done
     [ "$most" -le $((least * 2)) ] || fail "$least to $most samples"
+}
+
+@test "parts that are missing are named, and nothing is written" {
+    old_output out.exr
+    refuses 2 "out.exr: there are no parts beside it" -- merge out.exr
+    parts out.exr 3 "1 3" box.obj "${SMALL[@]}"
+    refuses 3 "out.exr: a part is missing: 2 of 3; bake it by --shard I/3" -- merge out.exr
+    parts out.exr 12 1 box.obj "${SMALL[@]}"
+    refuses 2 "there are parts of 3 and of 12 shards" -- merge out.exr
+    refuses 3 "parts are missing: 2, 3, 4, 5, 6, 7 and 5 more of 12" -- merge out.exr --shards 12
+    untouched out.exr
+}
+
+@test "a part of other inputs, options, another version or another bake is named, with what differs" {
+    old_output out.exr
+    parts out.exr 2 1 box.obj "${SMALL[@]}"
+    parts out.exr 2 2 box.obj "${SMALL[@]}" --max-error 0.1
+    refuses 2 "out.exr.2-of-2.part: is of other inputs or options: its vdbshade_command is" "max-error" -- merge out.exr
+    parts out.exr 2 2 box.obj "${SMALL[@]}"
+    cp out.exr.2-of-2.part good
+    cp out.exr.1-of-2.part out.exr.2-of-2.part
+    refuses 2 "out.exr.2-of-2.part: holds part 1 of 2; was it renamed?" -- merge out.exr
+    sed "s/^vdbshade part ./vdbshade part 8/" good >out.exr.2-of-2.part
+    refuses 2 "out.exr.2-of-2.part: is of another version of vdbshade" -- merge out.exr
+    # the input changed behind the parts
+    cp good out.exr.2-of-2.part
+    parts box.exr 2 "" box.obj "${SMALL[@]}"
+    echo "# again" >>box.obj
+    refuses 2 "box.exr.1-of-2.part: is of other inputs or options: its vdbshade_input_0 is" -- merge box.exr
+    untouched out.exr
+}
+
+@test "a damaged part is refused at whatever byte, and by name" {
+    unless_sanitized "a few hundred runs"
+    parts out.exr 2 "" box.obj "${SMALL[@]}" --size 96
+    cp out.exr.2-of-2.part good
+    size=$(stat -c %s good)
+    for at in 0 3 15 16 20 24 31 32 40 47 48 55 56 60 64 72 100 200 400 800 1200 $((size / 2)) $((size - 900)) $((size - 9)) $((size - 1)); do
+        cp good out.exr.2-of-2.part
+        printf '\xff' | dd of=out.exr.2-of-2.part bs=1 seek=$at conv=notrunc status=none
+        cmp -s good out.exr.2-of-2.part && continue
+        shade merge out.exr
+        [[ $status -eq 2 || $status -eq 3 || $status -eq 4 ]] || fail "byte $at"
+        [[ $stderr == *"out.exr.2-of-2.part: "* ]] || fail "byte $at"
+        [ ! -e out.exr ] || fail "byte $at"
+    done
+    for bytes in 0 1 20 55 56 63 64 500 $((size - 8)) $((size - 1)); do
+        head -c "$bytes" good >out.exr.2-of-2.part
+        refuses 2 "out.exr.2-of-2.part: " -- merge out.exr
+    done
+    (cat good && echo) >out.exr.2-of-2.part
+    refuses 2 "out.exr.2-of-2.part: damaged" -- merge out.exr
+}
+
+@test "what a part names is read, not written: outputs are those that merge is given" {
+    parts out.exr 1 "" box.obj "${SMALL[@]}" --stats kept.json
+    rm kept.json
+    mv out.exr.1-of-1.part other.exr.1-of-1.part
+    "$VDBSHADE" merge other.exr --quiet
+    [ -e other.exr ]
+    [ ! -e out.exr ]
+    [ ! -e kept.json ]
+}
+
+@test "a part that cannot be written leaves none" {
+    refuses 3 "none" -- bake box.obj "${SMALL[@]}" -o none/out.exr --shard 1/2
+    for text in 0/2 3/2 1 1/ /2 1/2/3 a/b 1/20000 -1/2; do
+        refuses 2 "--shard '$text': expected I/N" -- bake box.obj "${SMALL[@]}" -o out.exr "--shard=$text"
+    done
+    no_leftovers
+    [ -z "$(ls ./*.part 2>/dev/null)" ]
 }

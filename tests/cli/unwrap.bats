@@ -1,17 +1,20 @@
-# unwrap: lightmap UVs for meshes that have none.
+# Lightmap UVs that are made: by `unwrap`, for receivers of a bake (--unwrap, --texels-per-unit, --pages), and with its light as an OBJ.
 load helper
 
-setup() {
-    cd "$BATS_TEST_TMPDIR" || return 1
-    write_box box.obj
+LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
+# As SMALL, without a size.
+FIT=(--sun 0.3,1,0.2 --resolution 24)
+
+# The box without UVs, two boxes, and two of which the second is twice as large.
+prepare() {
     grep -v '^vt' box.obj | sed 's#/[0-9]*##g' >bare.obj
+    write_boxes two.obj box second
+    awk '/^o second/ {s = 1} /^v / && s {print "v", $2 * 2, $3 * 2, $4 * 2; next} {print}' two.obj >uneven.obj
 }
 
 @test "a mesh without UVs gets some that bake without a warning" {
-    succeed unwrap bare.obj -o out.obj --size 64
-    [[ $stderr == "vdbshade: out.obj: 6 charts on 1 page of 64 × 64, "*"texels a unit, stretch 1.0"* ]] || fail "no summary"
-    shade info out.obj --size 64
-    [[ $output == *"triangles: 12"*"UV sets: 1"* ]] || fail "no UVs"
+    succeed_saying "vdbshade: out.obj: 6 charts on 1 page of 64 × 64, " "texels a unit, stretch 1.0" -- unwrap bare.obj -o out.obj --size 64
+    succeed_printing "triangles: 12" "UV sets: 1" -- info out.obj --size 64
     [[ $output != *problem* ]] || fail "a problem"
     succeed bake out.obj -o out.exr --sun 0.3,1,0.2 --size 64 --resolution 24
     [[ $stderr != *warning* ]] || fail "a warning"
@@ -21,8 +24,7 @@ setup() {
     succeed unwrap "$ASSETS/cloister.glb" -o out.obj --quiet
     [ -z "$stderr" ] || fail "not quiet"
     shade info "$ASSETS/cloister.glb"
-    before=$(grep -o 'objects: .* triangles' <<<"$output")
-    info_tells out.obj "$before"
+    info_tells out.obj "$(grep -o 'objects: .* triangles' <<<"$output")"
     [ "$(grep -c '^vn' out.obj)" -gt 100 ] || fail "no normals"
 }
 
@@ -34,14 +36,7 @@ setup() {
 }
 
 @test "objects have pages of their own, with their names as materials, as small as a density needs" {
-    {
-        cat bare.obj
-        echo 'o second'
-        sed -n 's/^v //p' bare.obj | awk '{print "v", 3 * $1 + 5, 3 * $2, 3 * $3}'
-        sed -n 's/^f //p' bare.obj | awk '{ out = "f"; for (i = 1; i <= NF; ++i) out = out " " $i + 8; print out }'
-    } >two.obj
-    succeed unwrap two.obj -o out.obj --atlas objects --max-size 256 --texels-per-unit 8
-    [[ $stderr == *"12 charts on 2 pages of up to 128 × 64"* ]] || fail "no summary"
+    succeed_saying "12 charts on 2 pages of up to 64 × 64" -- unwrap uneven.obj -o out.obj --atlas objects --max-size 256 --texels-per-unit 8
     [ "$(grep '^usemtl' out.obj | tr '\n' ' ')" = "usemtl box usemtl second " ] || fail "$(grep usemtl out.obj)"
     refuse_each unwrap two.obj -o out.obj <<'LIST'
 2 --pages | --atlas objects --pages 2
@@ -52,8 +47,7 @@ LIST
 }
 
 @test "UVs that can serve are kept, and densities go by name" {
-    succeed unwrap box.obj -o out.obj --size 128 --keep
-    [[ $stderr == *"1 mesh kept their UVs"* ]] || fail "they were not kept"
+    succeed_saying "1 mesh kept their UVs" -- unwrap box.obj -o out.obj --size 128 --keep
     succeed unwrap box.obj -o out.obj --size 128 --density 'b*=0.5'
     refuses 2 none "'box'" -- unwrap box.obj -o out.obj --density none=2
     refuses 2 --density -- unwrap box.obj -o out.obj --density 3
@@ -70,7 +64,7 @@ LIST
     old_output out.obj
     refuse_each unwrap <<'LIST'
 2 -o | box.obj
-2 out.ply | box.obj -o out.ply
+2 'give -o OUT.obj, .glb or .gltf' out.ply | box.obj -o out.ply
 3 none/out.obj | box.obj -o none/out.obj
 2 box.obj | box.obj -o box.obj
 2 --padding | box.obj -o out.obj --padding -1
@@ -78,4 +72,241 @@ LIST
 3 none.obj | none.obj -o out.obj
 LIST
     untouched out.obj
+}
+
+@test "unwrap writes glTF, too: the input with another lightmap set" {
+    succeed unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
+    info_tells out.glb "UV sets: 2"
+}
+
+@test "a mesh without lightmap UVs gets some where an asset is written" {
+    succeed bake bare.obj "${SMALL[@]}" --ao 1 -o lit.glb
+    show_gltf lit.glb text | grep -q '"TEXCOORD_0".*"MOZ_lightmap"' || fail "no UVs, or no light"
+}
+
+@test "for an image it gets none unasked, and the error says how" {
+    ends 2 bake bare.obj "${SMALL[@]}" -o x.exr
+    says "--unwrap auto"
+    succeed bake bare.obj "${SMALL[@]}" --unwrap auto -o x.exr
+}
+
+@test "UVs that can be baked are kept, and always replaces them" {
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" -o plain.exr --quiet
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap auto -o auto.exr --quiet
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap always -o always.exr --quiet
+    same plain.exr auto.exr
+    differ plain.exr always.exr
+}
+
+@test "objects that each fill the square are packed apart" {
+    shade bake two.obj "${SMALL[@]}" --size 64 -o x.exr
+    [ "$status" -ne 0 ] || fail "baked over each other"
+    succeed bake two.obj "${SMALL[@]}" --size 64 --unwrap auto -o x.exr --verbose
+    [[ $stderr != *"overlap"* ]] || fail "$stderr"
+}
+
+@test "a density fills as many pages as it takes, each with an image of its own" {
+    local options=("${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20)
+    succeed bake two.obj "${options[@]}" --irradiance --ambient 0.25,0.25,0.25 -o x.exr
+    [ -s x.0.exr ] && [ -s x.1.exr ] && [ ! -e x.exr ] || fail "$(ls)"
+    succeed bake two.obj "${options[@]}" --seams keep --exr y.exr -o y.glb
+    [ -s y.glb ] || fail "no asset"
+    same x.0.exr y.0.exr
+    same x.1.exr y.1.exr
+}
+
+@test "a mesh that no page can hold lies on several, each triangle on one" {
+    succeed bake box.obj "${SMALL[@]}" --size 32 --unwrap always --texels-per-unit 20 -o x.exr --stats x.json --verbose
+    [ -s x.5.exr ] && [ ! -e x.6.exr ] || fail "$(ls)"
+    # solid still, though it is cut in six
+    [[ $stderr != *"lie over"* && $stderr != *"sheet"* && $stderr != *"open edges"* ]] || fail "$stderr"
+    # six squares of 20 texels and a border
+    holds "$(number_in x.json texels) >= 2400 && $(number_in x.json texels) <= 2904"
+}
+
+@test "UVs that can be baked are packed anew where a density is asked for" {
+    succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
+    # six unit squares
+    holds "$(number_in many.json texels) >= 1536 && $(number_in many.json texels) <= 1850"
+}
+
+@test "info tells density and stretch of UVs, and what auto would do" {
+    succeed_printing "lightmap UVs: 36.12 texels a unit at 100 × 100, stretch 1.048" "--unwrap auto: bakes these UVs as they are" -- info box.obj --size 100
+    info_tells two.obj "--unwrap auto: packs usable charts anew"
+    info_tells bare.obj "--unwrap auto: packs usable charts anew, and makes those of other meshes"
+    [[ $output != *"lightmap UVs"* ]] || fail "$output"
+}
+
+@test "a density that does not fit the pages is refused with one that does" {
+    old_output x.exr
+    shade bake two.obj "${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20 --pages 1 -o x.exr
+    [ "$status" -ne 0 ] || fail "fitted"
+    says two.obj fit
+    untouched x.exr
+}
+
+@test "threads change no bit of what is unwrapped" {
+    for threads in 1 4; do
+        "$VDBSHADE" bake two.obj "${SMALL[@]}" --size 64 --ao 1 --unwrap always --threads $threads -o $threads.exr --quiet
+    done
+    same 1.exr 4.exr
+}
+
+@test "of an atlas of objects each has the image that it has alone" {
+    succeed bake uneven.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --per-object -o maps/
+    [ "$(echo maps/*)" = "maps/box.exr maps/second.exr" ] || fail "$(echo maps/*)"
+    succeed bake uneven.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --receive second -o alone.exr
+    same alone.exr maps/second.exr
+}
+
+@test "a scene names its images by objects, as small as their densities need" {
+    cat >scene.json <<EOF
+{"casters": [{"mesh": "uneven.obj"}], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}],
+ "receivers": [{"mesh": "uneven.obj", "output": "map.png", "unwrap": "always", "atlas": "objects",
+                "texels_per_unit": 8, "max_size": 256, "density": {"*": 0.5, "second": 2}}]}
+EOF
+    succeed bake scene.json
+    info_tells map.box.png "32 × 16"
+    shade info map.second.png
+    [[ $output == *"128 × 64"* || $output == *"128 × 128"* ]] || fail "$output"
+    [ ! -e map.png ] || fail "$(ls)"
+    sed 's/"second": 2/"secnd": 2/' scene.json >bad.json
+    refuses 2 "no object is named 'secnd'" "did you mean 'second'?" "'box'" -- bake bad.json
+    for change in 's/"second": 2/"second": 0/' 's/"density": {[^}]*}/"density": 3/'; do
+        sed "$change" scene.json >bad.json
+        refuses 2 density -- bake bad.json
+    done
+}
+
+@test "densities go by name, and a pattern that means none is refused with the names" {
+    local bake=(bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --receive second) few many
+    succeed "${bake[@]}" -o plain.exr --stats plain.json
+    succeed "${bake[@]}" --density 'b*=3' --density 'sec*=2' -o dense.exr --stats dense.json
+    few=$(number_in plain.json texels) many=$(number_in dense.json texels)
+    # four times as many, and a border
+    holds "$many >= 3 * $few && $many <= 4 * $few"
+    refuse_each bake two.obj "${SMALL[@]}" --unwrap always -o x.exr <<'LIST'
+2 two.obj "'x*'" "'box', 'second'" | --density 'x*=2'
+2 --density PATTERN=X | --density box
+2 --density | --density box=-1
+LIST
+}
+
+@test "an asset of objects has a lightmap for each, and materials of its own where they show one" {
+    write_scene fit.json uneven.obj '' '"atlas": "objects", "max_size": 128, "texels_per_unit": 8, "unwrap": "always"'
+    no_sun "${FIT[@]}"
+    succeed bake fit.json "${rest[@]}" --ao 1 --seams keep -o lit.gltf --exr all.exr
+    for file in lit.lightmap.box.png lit.lightmap.second.png lit.occlusion.second.png all.box.exr all.second.exr; do
+        [ -s "$file" ] || fail "no $file: $(ls)"
+    done
+    grep -q '"lightmap of box"' lit.gltf || fail "no name of an image"
+    [ "$(grep -o '"MOZ_lightmap": {' lit.gltf | wc -l)" -eq 2 ] || fail "not two materials: $(cat lit.gltf)"
+    info_tells lit.lightmap.box.png "64 × 32"
+    info_tells lit.lightmap.second.png "64 × 64"
+    # the values are those of the images
+    shade bake fit.json "${rest[@]}" --ao 1 --irradiance --ambient 0.25,0.25,0.25 -o images.exr
+    same images.second.exr all.second.exr
+    # and what is invalid has a picture for each, of pages too
+    succeed bake fit.json "${rest[@]}" --ao 1 -o lit.glb --invalid where.png
+    [ "$(echo where*)" = "where.lit.box.png where.lit.second.png" ] || fail "$(ls)"
+    succeed bake uneven.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
+    [ "$(echo page*)" = "page.lit.0.png page.lit.1.png" ] || fail "$(ls)"
+}
+
+@test "objects whose UVs each fill the square are lit as they are, with a lightmap for each" {
+    "$VDBSHADE" bake two.obj "${SMALL[@]}" --irradiance --ambient 0.25,0.25,0.25 --size 64 --per-object -o maps/ --quiet
+    succeed bake two.obj "${SMALL[@]}" --size 64 --per-object --seams keep -o lit.glb --exr all.exr
+    same maps/box.exr all.box.exr
+    same maps/second.exr all.second.exr
+    [ "$(show_gltf lit.glb text | grep -o '"MOZ_lightmap":{' | wc -l)" -eq 2 ] || fail "not two materials"
+    ! show_gltf lit.glb text | grep -q TEXCOORD_1 || fail "new UVs"
+}
+
+@test "what does not go together with an atlas of objects or a largest size is refused" {
+    write_scene fit.json two.obj '' '"max_size": 64, "unwrap": "always"'
+    no_sun "${FIT[@]}"
+    refuses 2 max_size texels_per_unit -- bake fit.json "${rest[@]}" -o x.exr
+    refuses 2 pages -- bake two.obj "${SMALL[@]}" --per-object --pages 2 --unwrap always -o x.exr
+    refuses 4 two.obj "'box'" "would fit" -- bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
+}
+
+# scattered COUNT: triangles that share no edges, so each is a chart.
+scattered() {
+    awk -v count="$1" 'BEGIN {
+        for (i = 0; i < count; ++i) printf "v %d 0 0\nv %d 0 1\nv %d 0 0\n", 2 * i, 2 * i, 2 * i + 1
+        for (i = 0; i < count; ++i) printf "f %d %d %d\n", 3 * i + 1, 3 * i + 2, 3 * i + 3
+    }'
+}
+
+@test "charts that cover less than a fifth are warned of, with the size or density that helps" {
+    local bake=(--ao 1 --ao-method taps --resolution 16 -o out.exr --size) few=("charts cover " " % of " "texels: ") value
+    # charts of the file's own: a tenth of the square
+    printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 0.4 0\nvt 0.4 0.25\nvt 0 0.25\nf 1/1 2/2 3/3 4/4\n' >tenth.obj
+    succeed_saying "${few[@]}" "--unwrap always packs them anew, or --size 128 gives them more texels" -- bake tenth.obj "${bake[@]}" 64
+    succeed bake tenth.obj "${bake[@]}" 64 --unwrap always
+    [[ $stderr != *"charts cover"* ]] || fail "packed anew: $stderr"
+    # charts that padding keeps apart
+    scattered 100 >many.obj
+    succeed_saying "${few[@]}" "padding takes most of the image, so use --size " -- bake many.obj "${bake[@]}" 64 --unwrap auto
+    value=$(sed -n 's/.*so use --size //p' <<<"$stderr")
+    succeed bake many.obj "${bake[@]}" "$value" --unwrap auto
+    [[ $stderr != *"charts cover"* ]] || fail "--size $value: $stderr"
+    # a density that is too low for the size
+    succeed_saying "${few[@]}" "use a smaller --size, or --texels-per-unit " -- bake tenth.obj "${bake[@]}" 64 --unwrap always --texels-per-unit 8
+    value=$(sed -n 's/.*--texels-per-unit //p' <<<"$stderr")
+    succeed bake tenth.obj "${bake[@]}" 64 --unwrap always --texels-per-unit "$value"
+    # the chosen objects share the layout with others
+    { sed 's/^f/o tenth\nf/' tenth.obj; echo 'o other'; echo 'f 1/1 2/2 3/3'; } >chosen.obj
+    succeed bake chosen.obj "${bake[@]}" 64 --receive tenth
+    [[ $stderr != *"charts cover"* ]] || fail "chosen: $stderr"
+}
+
+@test "of an OBJ the light is an image that materials name, and fits the UVs" {
+    succeed bake bare.obj "${LIGHT[@]}" -o lit.obj
+    no_leftovers
+    [ "$(ls lit.*)" = $'lit.mtl\nlit.obj\nlit.preview.png' ] || fail "$(ls)"
+    [ "$(grep mtllib lit.obj)" = 'mtllib lit.mtl' ] || fail "$(head -3 lit.obj)"
+    [ "$(grep usemtl lit.obj)" = 'usemtl page_0' ] || fail 'not one material'
+    [ "$(grep -E '^(newmtl|map_)' lit.mtl)" = $'newmtl page_0\nmap_Ka lit.preview.png\nmap_Kd lit.preview.png' ] || fail "$(cat lit.mtl)"
+    # baked by the UVs that it has now
+    succeed bake lit.obj "${LIGHT[@]}" --irradiance --ambient 0.25,0.25,0.25 --seams fix --bits 8 \
+        --pack R=irradiance.R,G=irradiance.G,B=irradiance.B -o again.png
+    same lit.preview.png again.png
+    [ "$(grep -c '^f' lit.obj)" = 12 ] || fail 'triangles are lost'
+}
+
+@test "objects and their groups keep their names" {
+    { echo 'mtllib two.mtl' && sed 's/^o box/o first_box\nusemtl red/; /^f 4\//i usemtl blue' two.obj; } >named.obj
+    printf 'newmtl red\nnewmtl blue\n' >two.mtl
+    local parts
+    for command in 'bake --sun 0.3,1,0.2 --unwrap always' unwrap; do
+        succeed ${command%% *} named.obj $(cut -s -d' ' -f2- <<<"$command") --size 64 -o out.obj
+        shade info named.obj
+        parts=$(grep -c "^mesh" <<<"$output")
+        [ "$(grep '^o ' out.obj)" = $'o first_box\no second' ] || fail "$(grep '^[og] ' out.obj)"
+        info_tells out.obj "'first_box" "'second"
+        [ "$(grep -c "^mesh" <<<"$output")" = "$parts" ] || fail "not $parts parts"
+    done
+}
+
+@test "pages are materials with an image each, and what does not receive is unlit" {
+    succeed bake two.obj "${LIGHT[@]}" --size 32 --texels-per-unit 20 --unwrap always --no-receive second -o lit.obj
+    pages=$(grep -c '^newmtl page' lit.mtl)
+    [ "$pages" -gt 1 ] || fail "$(cat lit.mtl)"
+    for ((i = 0; i < pages; ++i)); do
+        [ -s "lit.preview.$i.png" ] && grep -q "^map_Kd lit.preview.$i.png" lit.mtl && grep -q "^usemtl page_$i" lit.obj || fail "page $i"
+    done
+    awk '/^usemtl/ { material = $2 } /^o / { object = $2; material = "" } /^f/ && object == "second" && material != "unlit" { exit 1 }' lit.obj ||
+        fail 'the second is lit'
+    grep -q '^newmtl unlit' lit.mtl || fail 'no such material'
+}
+
+@test "what an OBJ cannot have, and files of others, are refused" {
+    printf 'newmtl red\n' >lit.mtl
+    refuses 2 'lit.mtl: would be replaced, which vdbshade has not written' -- bake bare.obj "${LIGHT[@]}" -o lit.obj
+    [ "$(cat lit.mtl)" = 'newmtl red' ] && [ ! -e lit.obj ] && [ ! -e lit.preview.png ] || fail "$(ls)"
+    rm lit.mtl
+    refuses 2 "--view 'lit.html': shows the light of a .glb" -- bake bare.obj "${LIGHT[@]}" -o lit.obj --view lit.html
+    succeed bake bare.obj "${LIGHT[@]}" -o lit.obj
+    succeed bake bare.obj "${LIGHT[@]}" -o lit.obj # over its own
 }

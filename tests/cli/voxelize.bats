@@ -1,11 +1,15 @@
-# voxelize: meshes and scenes to level sets.
+# voxelize: meshes and scenes to level sets; and what casters are taken for: found by themselves, or said by name.
 load helper
 
+# A box whose faces look inwards, and one without a side.
+prepare() {
+    sed -E 's/^f ([^ ]*) ([^ ]*) ([^ ]*)/f \1 \3 \2/' box.obj >room.obj
+    sed '$d' box.obj | sed '$d' >crate.obj
+}
+
 @test "a mesh becomes a level set of the voxel size and band asked for" {
-    succeed voxelize box.obj -o out.vdb --voxel-size 0.04 --half-width 5
-    [[ $stderr == *"out.vdb: voxel 0.04, "*"active voxels"* ]] || fail "no summary"
-    shade info out.vdb
-    [[ $output == *"grid 'surface'"*"voxel size: 0.04 0.04 0.04"*"(5 voxels)"* ]] || fail "not what was asked for"
+    succeed_saying "out.vdb: voxel 0.04, " "active voxels" -- voxelize box.obj -o out.vdb --voxel-size 0.04 --half-width 5
+    succeed_printing "grid 'surface'" "voxel size: 0.04 0.04 0.04" "(5 voxels)" -- info out.vdb
 }
 
 @test "a resolution is counted along the longest side" {
@@ -44,8 +48,7 @@ LIST
 @test "FILE.vdb:GRID names a grid wherever a .vdb is read; a file of that whole name is the file" {
     "$VDBSHADE" voxelize box.obj -o box.vdb --name hull --voxel-size 0.1 --quiet
     printf '0.1,0.2,2\n0,3,0\n' >points.csv
-    printf 'v -3 -1 -3\nv 3 -1 -3\nv 3 -1 3\nv -3 -1 3\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 1 0\n%s\n' \
-        'f 1/1/1 4/4/1 3/3/1 2/2/1' >floor.obj
+    write_floor floor.obj
     for grid in box.vdb box.vdb:hull box.vdb:other; do
         printf '{"casters": [{"vdb": "%s"}], "lights": [{"name": "sun", "type": "directional", "angle_deg": 1, "direction": [0, 1, 0]}],
             "receivers": [{"mesh": "floor.obj", "size": 8, "output": "scene.exr"}]}' $grid >scene.json
@@ -67,4 +70,94 @@ LIST
     mv box.vdb 'a.vdb:hull.vdb'
     succeed query a.vdb:hull.vdb --points points.csv --distance -o out.csv
     succeed query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
+}
+
+@test "info says what objects are taken for" {
+    info_tells box.obj "taken for: 1 solid"
+    info_tells room.obj "taken for: 1 wall with air in front of faces"
+    info_tells crate.obj "taken for: 1 open solid," "problem: 4 open edges"
+}
+
+# A floor of 6 × 6, and a box without its bottom in it: 4 of 36 of the floor are within.
+write_standing() {
+    {
+        printf 'o floor\n'
+        printf 'v %s %s %s\n' -3 0 -3 3 0 -3 3 0 3 -3 0 3
+        printf 'vt %s %s\n' 0 0 1 0 1 1 0 1
+        printf 'f 1/1 4/4 3/3 2/2\no hut\n'
+        printf 'v %s %s %s\n' -1 -0.1 -1 1 -0.1 -1 1 -0.1 1 -1 -0.1 1 -1 2 -1 1 2 -1 1 2 1 -1 2 1
+        printf 'f %s %s %s %s\n' 12 11 10 9 5 9 10 6 6 10 11 7 7 11 12 8 8 12 9 5
+    } >"$1"
+}
+
+@test "texels of a floor below a hut without a floor are hidden" {
+    write_standing stands.obj
+    info_tells stands.obj "taken for: 1 open solid, hidden"
+    succeed bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json --verbose
+    [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 400' ] || fail "$(cat stats.json)"
+    succeed bake stands.obj --receive floor --treat hut=sheet -o floor.exr --ao 1 --size 60 --stats stats.json
+    [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 0' ] || fail "$(cat stats.json)"
+}
+
+# A slab of 6 × 6, and 25 studs without bottoms on it, 6 cm wide and 9 cm high.
+write_studs() {
+    {
+        printf 'o floor\nv -3 0 -3\nv 3 0 -3\nv 3 0 3\nv -3 0 3\nv -3 -1 -3\nv 3 -1 -3\nv 3 -1 3\nv -3 -1 3\n'
+        printf 'vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 4/4 3/3 2/2\nf 5/1 6/1 7/1 8/1\n'
+        printf 'f 1/1 2/1 6/1 5/1\nf 2/1 3/1 7/1 6/1\nf 3/1 4/1 8/1 7/1\nf 4/1 1/1 5/1 8/1\no studs\n'
+        awk 'BEGIN {
+            n = 9
+            for (i = 0; i < 25; ++i) {
+                x = -2.43 + int(i / 5) * 1.19; z = -2.37 + i % 5 * 1.17
+                for (y = 0; y < 2; ++y) for (k = 0; k < 4; ++k)
+                    print "v", x + (k == 1 || k == 2 ? 0.06 : 0), y * 0.1 - 0.01, z + (k > 1 ? 0.06 : 0)
+                print "f", n + 7, n + 6, n + 5, n + 4
+                for (k = 0; k < 4; ++k) print "f", n + k, n + 4 + k, n + 4 + (k + 1) % 4, n + (k + 1) % 4
+                n += 8
+            }
+        }'
+    } >"$1"
+}
+
+@test "AO between texels keeps the foot of what the voxels lose" {
+    write_studs studs.obj
+    for spacing in 1 8; do
+        write_scene studs.json studs.obj '' "\"objects\": \"floor\", \"ao_spacing\": $spacing"
+        succeed bake studs.json --resolution 16 --ao 0.3 --size 384 -o $spacing.exr
+    done
+    shade compare 1.exr 8.exr
+    local largest
+    largest=$(sed -nE 's/^ao:.* max ([0-9.]+) at.*/\1/p' <<<"$output")
+    awk -v largest="$largest" 'BEGIN { exit !(largest > 0 && largest < 0.175) }' || fail "off by $largest"
+}
+
+@test "a room whose faces look inwards is baked" {
+    succeed bake room.obj -o room.exr --verbose --ao 0.5 --size 64 --resolution 64 --ao-method exact
+    [[ $stderr != *"are invalid"* ]] || fail "$stderr"
+}
+
+@test "solid, shell and inward overrule what is found" {
+    succeed_saying "baked as a shell" -- voxelize crate.obj --verbose -o crate.vdb --resolution 32
+    succeed_saying "closed over the holes" -- voxelize crate.obj --verbose -o crate.vdb --resolution 32 --treat '*=solid'
+    succeed_saying "baked as a shell" -- voxelize box.obj --verbose -o shell.vdb --resolution 32 --treat 'b*=sheet' --treat 'box=sheet'
+    succeed_saying "triangles that face the other way" -- voxelize box.obj --verbose -o wall.vdb --resolution 32 --treat box=room
+}
+
+@test "a pattern that matches nothing is refused with names" {
+    refuses 2 "no object is named 'bix'" -- voxelize box.obj -o out.vdb --treat 'bix=solid'
+    [[ $stderr == *"did you mean 'box'"* ]] || fail "no name"
+    [ ! -e out.vdb ] || fail "written all the same"
+    refuses 2 "no object is named 'none*'" -- bake box.obj -o out.exr --ao 1 --treat 'none*=room'
+}
+
+@test "casters of a scene say it too" {
+    cat >scene.json <<'JSON'
+{"casters": [{"mesh": "crate.obj", "solid": "box"}, {"mesh": "box.obj", "shell": ["b*"], "inward": ["box"],
+  "transform": {"translate": [3, 0, 0]}}],
+ "resolution": 32}
+JSON
+    succeed_saying "closed over the holes" -- voxelize scene.json --verbose -o out.vdb
+    [[ $stderr == *"face the other way"* ]] || fail "not inward: $stderr"
+    sed -i 's/"solid": "box"/"solid": "bax"/' scene.json
+    refuses 2 "no object is named 'bax'" -- voxelize scene.json -o out.vdb
 }

@@ -7,7 +7,7 @@
 
 #include "sandbox/reader.h"
 
-#include <vdbshade/reader.h>
+#include <vdbshade/base.h>
 
 #include <linux/futex.h>
 #include <pthread.h>

@@ -1,11 +1,10 @@
-/* A program that has OpenVDB grids of its own: there and back without a file. */
-#include <vdbshade/openvdb.h>
-#include <vdbshade/vdbshade.h>
-
+/* A C++ program with OpenVDB grids of its own: there and back without a file. */
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <openvdb/tools/LevelSetSphere.h>
+
+#include <vdbshade/vdbshade.h>
 
 static int failures;
 
@@ -24,6 +23,12 @@ static bool same_values(const openvdb::FloatGrid &a, const openvdb::FloatGrid &b
 }
 
 int main() {
+    const vsh_run sized = vsh_run_default();
+    expect("structs have the size that they have in C",
+           sized.struct_size == sizeof sized &&
+               vsh_lightmap_options_default().struct_size == sizeof(vsh_lightmap_options) &&
+               vsh_render_options_default().struct_size == sizeof(vsh_render_options) &&
+               vsh_bake_stats_zero().struct_size == sizeof(vsh_bake_stats));
     openvdb::initialize();
     vsh_error error = {VSH_OK, ""};
     const openvdb::FloatGrid::Ptr ball = openvdb::tools::createLevelSetSphere<openvdb::FloatGrid>(
@@ -46,11 +51,9 @@ int main() {
 
     vsh_occluders *occluders = nullptr;
     expect("which casts", vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &error) == VSH_OK);
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(occluders, &parts);
     float distance = 0.0f;
     const double point[3] = {0.5, 0.5, 0.0};
-    vsh_field_sample(parts.field, 1, point, &distance);
+    vsh_field_sample(vsh_occluders_get_field(occluders, nullptr), 1, point, &distance);
     expect("from where it is", std::fabs(distance - 0.5f) < 0.05f);
 
     vsh_voxels *voxels = nullptr;
@@ -81,7 +84,7 @@ int main() {
 
     vsh_grid *none = nullptr;
     const openvdb::FloatGrid::ConstPtr given = kept;
-    expect("what another OpenVDB made is refused",
+    expect("a grid of another OpenVDB is refused",
            vsh_grid_from_openvdb(&given, OPENVDB_LIBRARY_VERSION_NUMBER + 1, OPENVDB_ABI_VERSION_NUMBER,
                                  nullptr, &none, &error) == VSH_ERROR_UNSUPPORTED &&
                none == nullptr && std::strstr(error.message, OPENVDB_LIBRARY_VERSION_STRING) != nullptr);

@@ -1,4 +1,4 @@
-/* What loading the library does to its host: nothing. It begins no thread, and OpenVDB, whose libraries do,
+/* Loading the library does nothing to its host. It begins no thread, and OpenVDB, whose libraries do,
  * is loaded with the first level set. With an argument, the module of level sets is not there. */
 #include <vdbshade/vdbshade.h>
 

@@ -1,10 +1,8 @@
-#include "faults.h"
+/* Allocations that fail, and blocks that are counted (scenarios.h). */
+#include "scenarios.h"
 
 #include <errno.h>
 #include <pthread.h>
-#include <stdbool.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { ROOM = 1 << 20 }; /* live blocks at a time, twice */
 
@@ -17,23 +15,18 @@ static struct {
 } state;
 static char gone;
 
-void *__real_malloc(size_t size);
-void *__real_calloc(size_t count, size_t size);
-void *__real_realloc(void *old, size_t size);
-void *__real_aligned_alloc(size_t alignment, size_t size);
-int __real_posix_memalign(void **block, size_t alignment, size_t size);
-char *__real_strdup(const char *text);
-char *__real_strndup(const char *text, size_t size);
-void __real_free(void *block);
-
-void *__wrap_malloc(size_t size);
-void *__wrap_calloc(size_t count, size_t size);
-void *__wrap_realloc(void *old, size_t size);
-void *__wrap_aligned_alloc(size_t alignment, size_t size);
-int __wrap_posix_memalign(void **block, size_t alignment, size_t size);
-char *__wrap_strdup(const char *text);
-char *__wrap_strndup(const char *text, size_t size);
-void __wrap_free(void *block);
+/* The linker names the library's function __real_…, and the one of this file __wrap_…. */
+#define WRAPPED(type, function, ...)                                                                         \
+    type __real_##function(__VA_ARGS__);                                                                     \
+    type __wrap_##function(__VA_ARGS__);
+WRAPPED(void *, malloc, size_t size)
+WRAPPED(void *, calloc, size_t count, size_t size)
+WRAPPED(void *, realloc, void *old, size_t size)
+WRAPPED(void *, aligned_alloc, size_t alignment, size_t size)
+WRAPPED(int, posix_memalign, void **block, size_t alignment, size_t size)
+WRAPPED(char *, strdup, const char *text)
+WRAPPED(char *, strndup, const char *text, size_t size)
+WRAPPED(void, free, void *block)
 
 void faults_begin(uint64_t first, int all) {
     pthread_mutex_lock(&lock);
@@ -93,7 +86,7 @@ static void *note(void *block) {
     return block;
 }
 
-/* What a library has made, for us to free, is not known here. */
+/* Blocks that a library made for us to free are not known here. */
 static void forget(const void *block) {
     if (block != NULL) {
         pthread_mutex_lock(&lock);

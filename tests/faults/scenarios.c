@@ -1,32 +1,38 @@
+/* Small runs through the public calls: reading, making casters, shading, baking, writing. */
 #include "scenarios.h"
 #include "../unit/previews.h"
-
-#include <math.h>
-#include <stdbool.h>
 
 OWNER(vsh_provenance)
 
 static void free_list(double **list) {
-    vsh_spheres_list_free(*list);
+    vshi_spheres_list_free(*list);
 }
 
-/* --- what several of them need */
+/* --- parts of several scenarios */
 
-void parts_fill(float *values, size_t count) {
+/* Values 0 … 1, no two neighbours alike. */
+static void parts_fill(float *values, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         values[i] = (float)(i * 37 % 101) / 100.0f;
     }
 }
 
-vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **occluders, vsh_error *error) {
+/* A cube of 1. */
+static vsh_mesh cube(void) {
     static const float corners[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
     static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
                                        3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
-    const vsh_mesh mesh = {
+    return (vsh_mesh){
         .name = "box", .positions = corners, .indices = indices, .vertex_count = 8, .triangle_count = 12};
+}
+
+/* The cube in a few voxels. */
+static vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **occluders,
+                                  vsh_error *error) {
+    const vsh_mesh mesh = cube();
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 6;
-    vsh_field_options wide = vsh_field_options_default();
+    vsh_occluders_options wide = vsh_occluders_options_default();
     wide.reach = 1.0;
     *grid = NULL;
     *occluders = NULL;
@@ -35,7 +41,8 @@ vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **
     return VSH_OK;
 }
 
-void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]) {
+/* Points around the cube, with normals up. */
+static void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]) {
     for (int i = 0; i < POINTS; ++i) {
         positions[3 * i] = 0.03 * i - 0.7;
         positions[3 * i + 1] = 1.1;
@@ -71,15 +78,15 @@ static vsh_result load_scene(const vsh_run *run, vsh_error *error) {
     OWNED(vsh_scene) *scene = NULL;
     OWNED(vsh_assets) *assets = NULL;
     OWNED(vsh_grid) *grid = NULL, *layer = NULL;
-    OWNED(vsh_triangles) *triangles = NULL;
+    OWNED(vshi_triangles) *triangles = NULL;
     OWNED(vsh_occluders) *occluders = NULL;
     vsh_scene_occluders_options options = vsh_scene_occluders_options_default();
     options.truth = 1;
     MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
     MAKE(assets, vsh_assets_load(scene, run, &assets, error));
     MAKE(grid, vsh_scene_casters(scene, assets, run, &grid, error));
-    MAKE(layer, vsh_scene_layer_casters(scene, assets, &scene->layers[0], run, &layer, error));
-    MAKE(triangles, vsh_scene_triangles(scene, assets, &scene->layers[0], run, &triangles, error));
+    MAKE(layer, vshi_scene_layer_casters(scene, assets, &scene->layers[0], run, &layer, error));
+    MAKE(triangles, vshi_scene_triangles(scene, assets, &scene->layers[0], run, &triangles, error));
     MAKE(occluders, vsh_scene_occluders(scene, assets, &options, run, &occluders, error));
     return VSH_OK;
 }
@@ -102,9 +109,12 @@ static vsh_result make_grids(const vsh_run *run, vsh_error *error) {
     options.resolution = 10;
     const vsh_distance distance = {ball, NULL, 2.0, 0, {-1, -1, -1}, {1, 1, 1}};
     const double moved[12] = {1, 0, 0, 0.53, 0, 1, 0, 0.1, 0, 0, 1, 0};
-    OWNED(vsh_grid) *from_sdf = NULL, *from_distance = NULL, *united = NULL;
+    OWNED(vsh_grid) *from_sdf = NULL, *from_distance = NULL, *from_meshes = NULL, *united = NULL;
+    vsh_mesh boxes[] = {cube(), cube()}; /* which overlap */
+    boxes[1].transform = moved;
     MAKE(from_sdf, vsh_grid_from_sdf(&sdf, &options, run, &from_sdf, error));
     MAKE(from_distance, vsh_grid_from_distance(&distance, &options, run, &from_distance, error));
+    MAKE(from_meshes, vsh_grid_from_meshes(boxes, 2, &options, run, &from_meshes, error));
     const vsh_grid_instance instances[] = {{from_sdf, NULL}, {from_distance, moved}};
     MAKE(united, vsh_grid_unite(instances, 2, &options, run, &united, error));
     return VSH_OK;
@@ -145,9 +155,9 @@ static vsh_result shade_points(const vsh_run *run, vsh_error *error) {
 static vsh_result ask(const vsh_run *run, vsh_error *error) {
     OWNED(vsh_grid) *grid = NULL;
     OWNED(vsh_occluders) *occluders = NULL, *layered = NULL;
-    OWNED(vsh_heights) *heights = NULL;
+    OWNED(vshi_heights) *heights = NULL;
     OWNED(vsh_model) *model = NULL;
-    OWNED(vsh_spheres) *spheres = NULL;
+    OWNED(vshi_spheres) *spheres = NULL;
     FREED_BY(free_list) double *list = NULL;
     size_t count = 0;
     OWNED(vsh_query) *query = NULL;
@@ -158,27 +168,26 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     const vsh_heights_source source = {
         .columns = SIDE, .rows = SIDE, .values = samples, .size = {4, 4}, .height = 0.5};
     TRY(parts_occluders(run, &grid, &occluders, error));
-    MAKE(heights, vsh_heights_create(&source, run, &heights, error));
+    MAKE(heights, vshi_heights_create(&source, run, &heights, error));
     MAKE(model, vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &model, error));
     vsh_model_free(model);
     model = NULL;
     MAKE(model, vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, run, &model, error));
-    MAKE(list, vsh_spheres_read("balls.csv", run, &list, &count, error));
-    MAKE(spheres, vsh_spheres_create(list, count, NULL, run, &spheres, error));
+    MAKE(list, vshi_spheres_read("balls.csv", run, &list, &count, error));
+    MAKE(spheres, vshi_spheres_create(list, count, NULL, run, &spheres, error));
     static const char *const names[] = {"sun"};
-    vsh_layer layers[] = {vsh_layer_default(), vsh_layer_default(), vsh_layer_default()};
+    vshi_layer layers[] = {vshi_layer_default(), vshi_layer_default(), vshi_layer_default()};
     layers[0].heights = heights;
     layers[0].method = VSH_SHADOW_CLASSIC;
     layers[1].spheres = spheres;
     layers[1].method = VSH_SHADOW_CLASSIC;
     layers[1].lights = names;
     layers[1].light_count = 1;
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(occluders, &parts);
+    vshi_occluder_parts parts = parts_of(occluders);
     layers[2].field = parts.field;
     parts.layers = layers;
     parts.layer_count = 3;
-    MAKE(layered, vsh_occluders_from_parts(&parts, &layered, error));
+    MAKE(layered, vshi_occluders_from_parts(&parts, &layered, error));
     vsh_shade_options options = preview_options();
     const vsh_light light = vsh_light_default();
     MAKE(query, vsh_query_create(layered, &light, 1, &options, &query, error));
@@ -194,8 +203,8 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
 
 static vsh_result trace(const vsh_run *run, vsh_error *error) {
     OWNED(vsh_model) *model = NULL;
-    OWNED(vsh_triangles) *triangles = NULL;
-    OWNED(vsh_solids) *solids = NULL;
+    OWNED(vshi_triangles) *triangles = NULL;
+    OWNED(vshi_solids) *solids = NULL;
     OWNED(vsh_occluders) *occluders = NULL;
     vsh_occluders_options few = vsh_occluders_options_default();
     few.grid.resolution = 10;
@@ -208,10 +217,11 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
-    MAKE(solids, vsh_solids_create(&sdf, NULL, 1, &solids, error));
-    MAKE(triangles, vsh_triangles_create(&mesh, 1, run, &triangles, error));
-    TRY(vsh_trace_shadow(triangles, solids, POINTS, positions, normals, 0.01, &light, 8, run, values, error));
-    TRY(vsh_trace_ao(triangles, solids, POINTS, positions, normals, 0.01, 1.0, 8, run, values, error));
+    MAKE(solids, vshi_solids_create(&sdf, NULL, 1, &solids, error));
+    MAKE(triangles, vshi_triangles_create(&mesh, 1, run, &triangles, error));
+    TRY(vshi_trace_shadow(triangles, solids, POINTS, positions, normals, 0.01, &light, 8, run, values,
+                          error));
+    TRY(vshi_trace_ao(triangles, solids, POINTS, positions, normals, 0.01, 1.0, 8, run, values, error));
     return VSH_OK;
 }
 
@@ -266,51 +276,26 @@ static vsh_result light_model(const vsh_run *run, vsh_error *error) {
     return light_asset("box.obj", false, run, error);
 }
 
-/* A bent sheet, a copy of it and an instance, on pages that are searched for; then with the UVs that came of
- * it. */
+/* A rough sheet and an instance of it, on pages that are searched for; then the sheet by its own UVs. */
 static vsh_result unwrap(const vsh_run *run, vsh_error *error) {
-    enum { N = 3, VERTICES = (N + 1) * (N + 1), TRIANGLES = 4 * N * N };
-    static float positions[VERTICES][3];
-    static uint32_t indices[TRIANGLES][3];
+    enum { EDGE = 4 };
     static const double twice[12] = {2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0};
-    for (uint32_t v = 0; v < VERTICES; ++v) {
-        const float x = (float)(v % (N + 1)), y = (float)(v / (N + 1));
-        positions[v][0] = x;
-        positions[v][1] = y;
-        positions[v][2] = 0.05F * (x * x + 2 * y * y);
-    }
-    for (uint32_t q = 0; q < 2 * N * N; ++q) {
-        const uint32_t v = q / N % N * (N + 1) + q % N, quad[4] = {v, v + 1, v + N + 2, v + N + 1};
-        for (uint32_t t = 0; t < 2; ++t) {
-            indices[2 * q + t][0] = quad[0];
-            indices[2 * q + t][1] = quad[1 + t];
-            indices[2 * q + t][2] = quad[2 + t];
-        }
-    }
-    vsh_mesh meshes[2] = {{.positions = positions[0],
-                           .indices = indices[0],
-                           .vertex_count = VERTICES,
-                           .triangle_count = TRIANGLES}};
-    meshes[1] = meshes[0];
+    float samples[EDGE * EDGE];
+    parts_fill(samples, EDGE * EDGE);
+    const vsh_heights_source source = {
+        .columns = EDGE, .rows = EDGE, .values = samples, .size = {4, 4}, .height = 2.0};
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_atlas) *atlas = NULL, *again = NULL;
+    MAKE(model, vsh_model_from_heights(&source, VSH_HEIGHTS_SURFACE, run, &model, error));
+    const vsh_mesh own = vsh_model_mesh(model, 0, 0);
+    vsh_mesh meshes[2] = {own, own};
+    meshes[0].uvs = meshes[1].uvs = NULL;
     meshes[1].transform = twice;
     vsh_unwrap_options options = vsh_unwrap_options_default();
     options.width = options.height = 64;
     options.max_pages = 2;
     options.keep_uvs = VSH_UNWRAP_KEEP;
-    OWNED(vsh_atlas) *atlas = NULL, *again = NULL;
     MAKE(atlas, vsh_unwrap(meshes, 2, &options, run, &atlas, error));
-    const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, 0);
-    static float corners[3 * TRIANGLES][3];
-    for (size_t v = 0; v < placed.vertex_count; ++v) {
-        for (size_t k = 0; k < 3; ++k) {
-            corners[v][k] = positions[placed.sources[v]][k];
-        }
-    }
-    const vsh_mesh own = {.positions = corners[0],
-                          .uvs = placed.uvs,
-                          .indices = placed.indices,
-                          .vertex_count = placed.vertex_count,
-                          .triangle_count = placed.triangle_count};
     options.max_pages = 1;
     MAKE(again, vsh_unwrap(&own, 1, &options, run, &again, error));
     return VSH_OK;
@@ -351,6 +336,165 @@ static vsh_result write_scene_page(const vsh_run *run, vsh_error *error) {
     scene.shade = preview_options();
     scene.ao = 1;
     return vsh_view_write_scene("out.html", "a scene", &scene, run, error);
+}
+
+/* --- scenarios that bake, and that write and read images */
+
+enum { FLAT_TEXELS = 64 };
+
+/* Of the package fonts-dejavu-core. */
+#define FONT "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
+
+static void free_image(vsh_image_file **file) {
+    vsh_image_free(*file);
+}
+
+static vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
+    OWNED(vsh_charts) *charts = NULL, *fine = NULL;
+    OWNED(vshi_texels) *texels = NULL;
+    float planes[8][3 * SIDE * SIDE];
+    MAKE(model, vsh_model_read("box.obj", run, &model, error));
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    TRY(parts_occluders(run, &grid, &occluders, error));
+    vsh_lightmap_options options = preview_lightmap_options();
+    options.width = options.height = SIDE;
+    options.tangents = 1;
+    MAKE(charts, vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, error));
+    MAKE(texels, vshi_texels_create(charts, run, &texels, error));
+    vsh_light lights[] = {vsh_light_default(), vsh_light_default()};
+    strcpy(lights[1].name, "moon");
+    lights[1].direction[0] = 1.0;
+    float *const shadow[] = {planes[0], planes[1]}, *const tint[] = {planes[2], planes[3]};
+    const vsh_lightmap all = {.shadow = shadow,
+                              .ao = planes[4],
+                              .irradiance = planes[5],
+                              .coverage = planes[6],
+                              .bent = planes[7],
+                              .tint = tint,
+                              .tint_by = {VSH_TINT_QUADRATIC, {1, 1, 1}},
+                              .bent_space = VSH_BENT_TANGENT};
+    TRY(vsh_bake_lightmap(occluders, charts, lights, 2, NULL, run, &all, NULL, error));
+    vsh_shade_options adaptive = preview_options();
+    adaptive.method = VSH_SHADOW_ADAPTIVE;
+    adaptive.ao_method = VSH_AO_ADAPTIVE;
+    adaptive.rays = 16;
+    const vsh_lightmap some = {
+        .shadow = shadow, .ao = planes[4], .coverage = planes[6], .ao_error = planes[7]};
+    TRY(vsh_bake_lightmap(occluders, charts, lights, 2, &adaptive, run, &some, NULL, error));
+    options.supersample = 2;
+    MAKE(fine, vsh_charts_create(&mesh, 1, &options, run, NULL, &fine, error));
+    vsh_stitch_options creases = vsh_stitch_options_default();
+    creases.max_angle = 180.0; /* a box has no other seams */
+    TRY(stitch_one(fine, &all, 2, &creases, run, NULL, error));
+    TRY(vsh_bake_lightmap(occluders, fine, lights, 2, NULL, run, &some, NULL, error));
+    return VSH_OK;
+}
+
+static vsh_result bake_volume(const vsh_run *run, vsh_error *error) {
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
+    OWNED(vsh_voxels) *band = NULL, *box = NULL;
+    OWNED(vsh_volume) *on_band = NULL, *in_box = NULL;
+    const double least[] = {-1, -1, -1}, most[] = {2, 2, 2};
+    const vsh_light light = vsh_light_default();
+    vsh_volume_options options = preview_volume_options();
+    options.ao = 1;
+    options.shade.ao_cones = 4;
+    TRY(parts_occluders(run, &grid, &occluders, error));
+    MAKE(band, vsh_voxels_from_grid(grid, 2.0, run, &band, error));
+    MAKE(on_band, vsh_bake_volume(occluders, band, &light, 1, &options, run, &on_band, NULL, error));
+    MAKE(box, vsh_voxels_from_box(least, most, 0.4, run, &box, error));
+    MAKE(in_box, vsh_bake_volume(occluders, box, &light, 1, &options, run, &in_box, NULL, error));
+    TRY(vsh_volume_write(in_box, "out.vdb", 1, NULL, 0, error));
+    return VSH_OK;
+}
+
+static vsh_result draw(const vsh_run *run, vsh_error *error) {
+    OWNED(vsh_model) *model = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_occluders) *occluders = NULL;
+    float planes[4][3 * SIDE * SIDE], light_plane[SIDE * SIDE];
+    parts_fill(light_plane, SIDE * SIDE);
+    static const char *const name = "shadow.sun";
+    const float *const plane = light_plane;
+    const vsh_image lightmap = {SIDE, SIDE, 1, &name, &plane, NULL};
+    const vsh_light light = vsh_light_default();
+    vsh_render_options options = preview_render_options();
+    options.width = options.height = SIDE;
+    options.samples = 1;
+    options.ao = 1;
+    options.shafts = 0.5;
+    MAKE(model, vsh_model_read("box.obj", run, &model, error));
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    TRY(parts_occluders(run, &grid, &occluders, error));
+    const vshi_occluder_parts parts = parts_of(occluders);
+    const vsh_surface surface = {parts.field, {0.5, 0.5, 0.5}};
+    const vsh_lit_meshes lit = {&mesh, 1, &lightmap, {1, 1, 1}, 0};
+    options.lit = &lit;
+    options.lit_count = 1;
+    const double least[] = {0, 0, 0}, most[] = {1, 1, 1};
+    TRY(vsh_camera_frame(&options.camera, least, most, 0.5, 0.5, 1.0, error));
+    const vsh_picture picture = {planes[0], planes[1], planes[2], planes[3]};
+    TRY(vsh_render(&surface, 1, occluders, &light, 1, &options, run, &picture, NULL, error));
+    float *const rgb[] = {planes[1], planes[2], planes[3]};
+    TRY(vsh_picture_encode(&picture, SIDE, SIDE, 0.0, rgb, NULL, error));
+    return VSH_OK;
+}
+
+static vsh_result bake_flat(const vsh_run *run, vsh_error *error) {
+    OWNED(vsh_outline) *outline = NULL, *text = NULL, *both = NULL, *crossed = NULL;
+    OWNED(vsh_flat_scene) *scene = NULL;
+    OWNED(vsh_grid) *grid = NULL;
+    static float planes[4][FLAT_TEXELS];
+    MAKE(scene, vsh_flat_scene_read("flat.json", NULL, &scene, error));
+    MAKE(outline, vshi_flat_scene_casters(scene, run, &outline, error));
+    MAKE(text, vshi_outline_from_text("A8", FONT, NULL, run, &text, error));
+    const double star[] = {0, 0, 2, 0.1, 0, 0.3, 1, -1, 1, 1};
+    const size_t count = 5;
+    MAKE(crossed, vsh_outline_from_polygons(star, &count, 1, run, &crossed, error));
+    const vshi_outline_instance instances[] = {{outline, NULL}, {crossed, NULL}, {text, NULL}};
+    MAKE(both, vshi_outline_unite(instances, 3, run, &both, error));
+    vsh_grid_options voxels = vsh_grid_options_default();
+    voxels.resolution = 8;
+    MAKE(grid, vsh_grid_from_outline(both, 1.0, NULL, &voxels, run, &grid, error));
+    float *const shadow[] = {planes[0]}, *const irradiance[] = {planes[1], planes[2], planes[3]};
+    static float coverage[FLAT_TEXELS];
+    const vsh_flat_map map = {shadow, irradiance, coverage};
+    vsh_flat_options options = scene->options;
+    TRY(vshi_flat_bake(both, scene->lights, 1, &options, run, &map, error));
+    options.method = VSH_FLAT_CLASSIC;
+    TRY(vshi_flat_bake(both, scene->lights, 1, &options, run, &map, error));
+    return VSH_OK;
+}
+
+static vsh_result write_image(const char *name, vsh_error *error) {
+    float pixels[4][SIDE * SIDE];
+    for (int i = 0; i < 4; ++i) {
+        parts_fill(pixels[i], SIDE * SIDE);
+    }
+    static const char *const names[] = {"shadow.sun", "ao", "x", "A"};
+    const float *const planes[] = {pixels[0], pixels[1], pixels[2], pixels[3]};
+    const vsh_image image = {SIDE, SIDE, 4, names, planes, NULL};
+    return vsh_image_write(name, &image, NULL, error);
+}
+
+#define WRITES_IMAGE(function, name)                                                                         \
+    static vsh_result function(const vsh_run *run, vsh_error *error) {                                       \
+        return write_image(name, error);                                                                     \
+    }
+WRITES_IMAGE(write_exr, "out.exr")
+WRITES_IMAGE(write_png, "out.png")
+WRITES_IMAGE(write_tif, "out.tif")
+
+static vsh_result read_images(const vsh_run *run, vsh_error *error) {
+    for (size_t i = 0; i < IMAGES; ++i) {
+        FREED_BY(free_image) vsh_image_file *file = NULL;
+        MAKE(file, vsh_image_read(images[i], run, &file, error));
+    }
+    return VSH_OK;
 }
 
 const scenario scenarios[] = {

@@ -1,11 +1,8 @@
-/* Small runs through the public calls, for tests that let something fail in the middle of them. */
+/* Small runs through the public calls, and calls of the system that fail in the middle of them. */
 #ifndef FAULTS_SCENARIOS_H
 #define FAULTS_SCENARIOS_H
 
 #include "../unit/testing.h"
-
-#include <stdio.h>
-#include <stdlib.h>
 
 /* Runs to its end or to the first failure, whose code and error it returns, and frees what it made. Calls
  * that fail must leave NULL for their handles, else it aborts. */
@@ -28,7 +25,7 @@ int scenarios_end(void **state);
  * made so anew. */
 int scenarios_untouched(void);
 
-/* --- What scenarios are made of. */
+/* --- Parts of scenarios. */
 
 /* Runs a call; ends the scenario where it fails, and the test where it then left a handle. */
 #define TRY(call)                                                                                            \
@@ -55,16 +52,33 @@ enum { SIDE = 12, POINTS = 80, IMAGES = 3 };
 /* Of SIDE by SIDE pixels, one of each reader. */
 extern const char *const images[IMAGES];
 
-/* Values 0 … 1, no two neighbours alike. */
-void parts_fill(float *values, size_t count);
+/* --- Allocations that fail: the linker's --wrap sends every malloc, calloc, realloc, aligned_alloc,
+ * posix_memalign, strdup, strndup and free of our objects here, where the n-th may fail and what is not freed
+ * is counted. Allocations of the libraries underneath are not seen. */
 
-/* A cube of 1 in a few voxels. */
-vsh_result parts_occluders(const vsh_run *run, vsh_grid **grid, vsh_occluders **occluders, vsh_error *error);
+/* From now on the `first`-th allocation fails (from 1; 0: none) and, where `all` is not 0, every later one.
+ * Begins counting anew. */
+void faults_begin(uint64_t first, int all);
 
-/* Points around it, with normals up. */
-void parts_place(double positions[3 * POINTS], float normals[3 * POINTS]);
+/* Ends it; the number of allocations since, and in *failed how many of them were refused. */
+uint64_t faults_end(uint64_t *failed);
 
-/* Scenarios that bake and write (bakes.c). */
-scenario_fn bake_lightmap, bake_volume, draw, bake_flat, write_exr, write_png, write_tif, read_images;
+/* Blocks that were taken since the process began, and are not freed. */
+uint64_t faults_live(void);
+
+/* --- System calls of writing that fail: the linker's --wrap sends open, pwrite, fsync, close and rename of
+ * our objects here. Counted are those of files that are being written. */
+
+enum {
+    WRITES_FAIL,  /* the n-th fails, as on a full disk */
+    WRITES_SHORT, /* every pwrite writes but a part, every other is interrupted first: all must go well */
+    WRITES_KILL   /* SIGKILL in place of the n-th */
+};
+
+/* From now on; n from 1, 0: none. */
+void writes_begin(uint64_t n, int how);
+
+/* The number of calls since; *what names the one that failed, NULL: none did. */
+uint64_t writes_end(const char **what);
 
 #endif

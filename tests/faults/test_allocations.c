@@ -1,11 +1,9 @@
 /* Every allocation of our C code fails in turn, alone or with all that follow it: each time the call says so,
  * leaks nothing, leaves outputs as they were, and works when it is asked again. */
-#include "faults.h"
 #include "scenarios.h"
 
 #include <inttypes.h>
 #include <jansson.h>
-#include <unistd.h>
 
 enum { MOST = 20000, STEP = 5 };
 
@@ -51,7 +49,7 @@ TEST(every_allocation_may_fail) {
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         vsh_error error = {0};
-        for (int pass = 0; pass < 2; ++pass) { /* what libraries set up once */
+        for (int pass = 0; pass < 2; ++pass) { /* libraries set things up once */
             assert_that(s->run(&run, &error) == VSH_OK, "%s: %s", s->name, error.message);
         }
         scenarios_untouched(); /* no: it has written */

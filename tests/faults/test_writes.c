@@ -2,16 +2,13 @@
  * no temporary stays (after a kill: none after the next run), and the error says why. All work is done in
  * children, as a process that has begun threads cannot be forked. */
 #include "base/file.h"
-#include "faults.h"
 #include "scenarios.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
 #include <signal.h>
-#include <stdbool.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 enum { MOST = 2000, FINE = 0, BAD = 1, NOTHING_FAILED = 2 };
 
@@ -148,39 +145,38 @@ TEST(a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up) {
     }
 }
 
-static void touch(const char *name) {
-    FILE *file = fopen(name, "wb");
-    assert_non_null(file);
-    fclose(file);
-}
-
-TEST(what_a_process_still_writes_and_other_files_stay) {
-    static const char *const others[] = {".out.7.tmp.png",     ".out.tmp.exr",   ".out.x.tmp.exr",
-                                         ".out.7.tmp.exr.bak", "out.7.tmp.exr",  ".out2.7.tmp.exr",
-                                         ".out.7.exr",         ".out.7-.tmp.exr"};
-    static const char *const dead[] = {".out.7.tmp.exr", ".out.7-12.tmp.exr", ".out.2147483647.tmp.exr"};
-    enum { OTHERS = sizeof others / sizeof others[0], DEAD = sizeof dead / sizeof dead[0] };
+TEST(files_of_a_process_that_still_writes_and_of_others_stay) {
+    static const struct {
+        const char *name;
+        bool stays;
+    } files[] = {{".out.7.tmp.png", true},
+                 {".out.tmp.exr", true},
+                 {".out.x.tmp.exr", true},
+                 {".out.7.tmp.exr.bak", true},
+                 {"out.7.tmp.exr", true},
+                 {".out2.7.tmp.exr", true},
+                 {".out.7.exr", true},
+                 {".out.7-.tmp.exr", true},
+                 {".out.7.tmp.exr", false},
+                 {".out.7-12.tmp.exr", false},
+                 {".out.2147483647.tmp.exr", false}};
     const scenario *exr = NULL;
     for (size_t i = 0; i < scenario_count; ++i) {
         exr = strstr(scenarios[i].name, "EXR") != NULL ? &scenarios[i] : exr;
     }
     assert_non_null(exr);
     vshi_output live;
-    assert_int_equal(vshi_output_begin(&live, "out.exr", NULL), VSH_OK);
-    for (size_t i = 0; i < OTHERS; ++i) {
-        touch(others[i]);
-    }
-    for (size_t i = 0; i < DEAD; ++i) {
-        touch(dead[i]);
+    assert_ok(vshi_output_begin(&live, "out.exr", &failure));
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+        FILE *file = fopen(files[i].name, "wb");
+        assert_non_null(file);
+        fclose(file);
     }
     assert_int_equal(in_child(run_well, exr, 0), FINE);
     assert_int_equal(access(live.temporary, F_OK), 0);
-    assert_int_equal(vshi_output_commit(&live, NULL), VSH_OK);
-    for (size_t i = 0; i < DEAD; ++i) {
-        assert_int_equal(access(dead[i], F_OK), -1);
-    }
-    for (size_t i = 0; i < OTHERS; ++i) {
-        assert_int_equal(unlink(others[i]), 0);
+    assert_ok(vshi_output_commit(&live, &failure));
+    for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+        assert_int_equal(unlink(files[i].name) == 0, files[i].stays);
     }
     scenarios_untouched();
 }

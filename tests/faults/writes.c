@@ -1,13 +1,10 @@
-#include "faults.h"
+/* System calls of writing that fail (scenarios.h). */
+#include "scenarios.h"
 
 #include <errno.h>
 #include <fcntl.h>
 #include <signal.h>
-#include <stdarg.h>
-#include <stdbool.h>
-#include <stddef.h>
 #include <sys/types.h>
-#include <unistd.h>
 
 enum { MOST_FILES = 1024 };
 
@@ -19,16 +16,14 @@ static struct {
 } state;
 
 int __real_open(const char *path, int flags, ...);
-ssize_t __real_pwrite(int file, const void *data, size_t size, off_t offset);
-int __real_fsync(int file);
-int __real_close(int file);
-int __real_rename(const char *from, const char *to);
-
 int __wrap_open(const char *path, int flags, ...);
-ssize_t __wrap_pwrite(int file, const void *data, size_t size, off_t offset);
-int __wrap_fsync(int file);
-int __wrap_close(int file);
-int __wrap_rename(const char *from, const char *to);
+#define WRAPPED(type, function, ...)                                                                         \
+    type __real_##function(__VA_ARGS__);                                                                     \
+    type __wrap_##function(__VA_ARGS__);
+WRAPPED(ssize_t, pwrite, int file, const void *data, size_t size, off_t offset)
+WRAPPED(int, fsync, int file)
+WRAPPED(int, close, int file)
+WRAPPED(int, rename, const char *from, const char *to)
 
 void writes_begin(uint64_t n, int how) {
     state.how = how;

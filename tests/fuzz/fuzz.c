@@ -128,12 +128,14 @@ vsh_error *fuzz_error(void) {
     return &error;
 }
 
-void fuzz_ended(vsh_result result, const void *handle) {
+vsh_result fuzz_check(vsh_result result, const void *place) {
+    void *handle;
+    memcpy(&handle, place, sizeof handle);
     if (result == VSH_OK) {
         if (error.code != -1 || handle == NULL) {
             fail("success", handle == NULL ? "without a handle" : "with an error");
         }
-        return;
+        return result;
     }
     if (result < VSH_OK || result > VSH_ERROR_UNSUPPORTED) { /* VSH_ERROR_INTERNAL is a defect of ours */
         fail("code", vsh_result_name(result));
@@ -142,8 +144,16 @@ void fuzz_ended(vsh_result result, const void *handle) {
         fail("failure", handle != NULL ? "with a handle" : "without its code");
     }
     check_line(error.message, sizeof error.message);
+    return result;
 }
 
-void fuzz_ended_plain(vsh_result result) {
-    fuzz_ended(result, result == VSH_OK ? &error : NULL);
+void fuzz_require(int holds, const char *condition) {
+    if (!holds) {
+        fail("does not hold", condition);
+    }
+}
+
+vsh_result fuzz_check_plain(vsh_result result) {
+    const void *const handle = result == VSH_OK ? &error : NULL;
+    return fuzz_check(result, &handle);
 }

@@ -1,10 +1,23 @@
-/* What fuzz targets share. A target is one function, LLVMFuzzerTestOneInput(), that is given any bytes and
- * must come back: a crash, a sanitizer's report or an abort() is a find. Under libFuzzer (tools/fuzz), or
- * replaying files. */
+/* Helpers of fuzz targets. A target is one function, LLVMFuzzerTestOneInput(), that gets any bytes and must
+ * return. A crash, a sanitizer's report or an abort() is a find. Targets run under libFuzzer (tools/fuzz) or
+ * replay files. */
 #ifndef VSH_FUZZ_H
 #define VSH_FUZZ_H
 
-#include <vdbshade/base.h>
+#include <vdbshade/vdbshade.h>
+
+#ifndef __cplusplus
+#include "bake/texels.h"
+#include "compare/compare.h"
+#include "field/field.h"
+#include "flat/flat.h"
+#include "heightfield/heights.h"
+#include "image/image.h"
+#include "outline/outline.h"
+#include "shade/occluders.h"
+#include "spheres/spheres.h"
+#include "trace/trace.h"
+#endif
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -36,17 +49,26 @@ int fuzz_is_late(void);
 /* The error of the next call, filled with what no call leaves in it. */
 vsh_error *fuzz_error(void);
 
-/* Aborts where a call's result, its error and its handle do not fit together. */
-void fuzz_ended(vsh_result result, const void *handle);
+/* Aborts where a call's result, its error and its handle do not fit together; else returns the result.
+ * `place` is where the handle is. */
+vsh_result fuzz_check(vsh_result result, const void *place);
 
 /* The same for a call without a handle. */
-void fuzz_ended_plain(vsh_result result);
+vsh_result fuzz_check_plain(vsh_result result);
 
-/* Makes a handle by a call that is given fuzz_error(), and looks at all three once it has ended. */
-#define FUZZ_MAKE(handle, call)                                                                              \
+/* Aborts where a condition does not hold. */
+void fuzz_require(int holds, const char *condition);
+#define FUZZ_REQUIRE(condition) fuzz_require((condition), #condition)
+
+/* Makes a handle by a call that is given fuzz_error(), and checks all three. */
+#define FUZZ_MAKE(handle, call) fuzz_check((call), &(handle))
+
+/* Makes one by such a call, and frees it. */
+#define FUZZ_TRY(type, name, call)                                                                           \
     do {                                                                                                     \
-        const vsh_result fuzz_result = (call);                                                               \
-        fuzz_ended(fuzz_result, handle);                                                                     \
+        type *name;                                                                                          \
+        FUZZ_MAKE(name, call);                                                                               \
+        type##_free(name);                                                                                   \
     } while (0)
 
 #endif

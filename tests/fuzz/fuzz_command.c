@@ -5,14 +5,12 @@
  * MiB. */
 #include "fuzz.h"
 
-#include "cli/commands.h"
-#include "cli/message.h"
+#include "cli/cli.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <stdbool.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -66,9 +64,7 @@ static const struct {
 /* The files as they were, and no others. */
 static void clean(void) {
     DIR *listing = opendir(".");
-    if (listing == NULL || chdir(fuzz_folder()) != 0) {
-        abort();
-    }
+    FUZZ_REQUIRE(listing != NULL && chdir(fuzz_folder()) == 0);
     for (const struct dirent *entry = readdir(listing); entry != NULL; entry = readdir(listing)) {
         unlink(entry->d_name);
     }
@@ -117,10 +113,11 @@ static int take_words(fuzz_input *input, char text[MOST_WORDS][MOST_TEXT]) {
         const cli_option *option = &command->options[kind % command->option_count];
         if (kind >= 160) {
             take_value(input, text[words++]);
-        } else if (option->key != 0) {
-            const bool letter = option->key < 256 && (kind & 1);
-            snprintf(text[words++], MOST_TEXT, letter ? "-%.1s" : "--%s",
-                     letter ? (char[2]){(char)option->key, '\0'} : option->name);
+        } else if (option->name != NULL) {
+            const char letter = cli_letter_of(option->name);
+            const bool is_letter = letter != '\0' && (kind & 1);
+            snprintf(text[words++], MOST_TEXT, is_letter ? "-%.1s" : "--%s",
+                     is_letter ? (char[2]){letter, '\0'} : option->name);
             if (option->value != NULL) {
                 take_value(input, text[words++]);
             }
@@ -131,10 +128,8 @@ static int take_words(fuzz_input *input, char text[MOST_WORDS][MOST_TEXT]) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     static int runs;
-    if (runs == 0 && (chdir(fuzz_folder()) != 0 || freopen("/dev/null", "r", stdin) == NULL ||
-                      freopen("/dev/null", "w", stdout) == NULL)) {
-        abort();
-    }
+    FUZZ_REQUIRE(runs > 0 || (chdir(fuzz_folder()) == 0 && freopen("/dev/null", "r", stdin) != NULL &&
+                              freopen("/dev/null", "w", stdout) != NULL));
     if (runs++ % RUNS_A_CLEANING == 0) {
         clean();
     }
@@ -148,9 +143,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     words[count] = NULL;
     fuzz_run();
     const int code = vdbshade_main(count, words);
-    if (code != CLI_OK && code != CLI_USAGE && code != CLI_FILE && code != CLI_LIMIT &&
-        code != CLI_INTERRUPTED) {
-        abort();
-    }
+    FUZZ_REQUIRE(code == CLI_OK || code == CLI_USAGE || code == CLI_FILE || code == CLI_LIMIT ||
+                 code == CLI_INTERRUPTED);
     return 0;
 }

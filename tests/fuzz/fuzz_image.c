@@ -2,9 +2,8 @@
  * pixels: a heightfield of either kind, and the outline of a mask. */
 #include "fuzz.h"
 
-#include <vdbshade/heights.h>
 #include <vdbshade/image.h>
-#include <vdbshade/outline.h>
+#include <vdbshade/mesh.h>
 
 static void use(const vsh_image *image, const char *path) {
     vsh_run run = fuzz_run();
@@ -14,16 +13,10 @@ static void use(const vsh_image *image, const char *path) {
                                        .values = image->planes[0],
                                        .size = {1.0, 2.0},
                                        .height = 0.5};
-    vsh_heights *heights;
-    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error()));
-    vsh_heights_free(heights);
-    vsh_model *model;
-    FUZZ_MAKE(model, vsh_model_from_heights(&source, image->width % 2, &run, &model, fuzz_error()));
-    vsh_model_free(model);
+    FUZZ_TRY(vshi_heights, heights, vshi_heights_create(&source, &run, &heights, fuzz_error()));
+    FUZZ_TRY(vsh_model, model, vsh_model_from_heights(&source, image->width % 2, &run, &model, fuzz_error()));
     run = fuzz_run();
-    vsh_outline *outline;
-    FUZZ_MAKE(outline, vsh_outline_from_image(path, NULL, &run, &outline, fuzz_error()));
-    vsh_outline_free(outline);
+    FUZZ_TRY(vsh_outline, outline, vshi_outline_from_image(path, NULL, &run, &outline, fuzz_error()));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
@@ -32,9 +25,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     }
     const char *path = fuzz_file("a.png", data, size);
     vsh_image_file *file;
-    const vsh_result result = vsh_image_read(path, NULL, &file, fuzz_error());
-    fuzz_ended(result, file);
-    if (result == VSH_OK) {
+    if (FUZZ_MAKE(file, vsh_image_read(path, NULL, &file, fuzz_error())) == VSH_OK) {
         const vsh_image image = vsh_image_view(file);
         if ((int64_t)image.width * image.height <= 1 << 16) {
             use(&image, path);

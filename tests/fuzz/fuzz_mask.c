@@ -4,43 +4,34 @@
 #include "fuzz.h"
 
 #include <vdbshade/grid.h>
-#include <vdbshade/heights.h>
 #include <vdbshade/image.h>
-#include <vdbshade/outline.h>
+#include <vdbshade/mesh.h>
 
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 
 enum { MOST = 24, LEVELS = 4 };
 
 static void check_outline(const vsh_outline *outline) {
-    vsh_outline_info info;
-    vsh_outline_get_info(outline, &info);
+    vshi_outline_info info;
+    vshi_outline_get_info(outline, &info);
     const double inside[2] = {0.5 * (info.bounds_min[0] + info.bounds_max[0]),
                               0.5 * (info.bounds_min[1] + info.bounds_max[1])};
-    if (info.contours == 0 || !(info.area > 0.0) || !isfinite(vsh_outline_distance(outline, inside))) {
-        abort();
-    }
+    FUZZ_REQUIRE(info.contours > 0 && info.area > 0.0 && isfinite(vshi_outline_distance(outline, inside)));
     for (size_t i = 0; i < info.contours; ++i) {
         size_t count;
-        if (vsh_outline_contour(outline, i, &count) == NULL || count < 3) {
-            abort();
-        }
+        FUZZ_REQUIRE(vshi_outline_contour(outline, i, &count) != NULL && count >= 3);
     }
 }
 
 static void make_outline(const char *path, const vsh_mask_options *options, const vsh_run *run) {
     vsh_outline *outline;
-    const vsh_result result = vsh_outline_from_image(path, options, run, &outline, fuzz_error());
-    fuzz_ended(result, outline);
-    if (result == VSH_OK) {
+    if (FUZZ_MAKE(outline, vshi_outline_from_image(path, options, run, &outline, fuzz_error())) == VSH_OK) {
         check_outline(outline);
         vsh_grid_options grid_options = vsh_grid_options_default();
         grid_options.resolution = 8;
-        vsh_grid *grid;
-        FUZZ_MAKE(grid, vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error()));
-        vsh_grid_free(grid);
+        FUZZ_TRY(vsh_grid, grid,
+                 vsh_grid_from_outline(outline, 0.5, NULL, &grid_options, run, &grid, fuzz_error()));
     }
     vsh_outline_free(outline);
 }
@@ -68,15 +59,11 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const float *plane = pixels;
     const vsh_image image = {width, height, 1, &name, &plane, NULL};
     const char *path = fuzz_file("a.exr", "", 0);
-    if (vsh_image_write(path, &image, NULL, fuzz_error()) != VSH_OK) {
-        abort();
-    }
+    FUZZ_REQUIRE(vsh_image_write(path, &image, NULL, fuzz_error()) == VSH_OK);
     const vsh_run run = fuzz_run();
     make_outline(path, &options, &run);
     const vsh_heights_source source = {
         .name = path, .columns = width, .rows = height, .values = pixels, .size = {1.0, 1.0}, .height = 1.0};
-    vsh_heights *heights;
-    FUZZ_MAKE(heights, vsh_heights_create(&source, &run, &heights, fuzz_error()));
-    vsh_heights_free(heights);
+    FUZZ_TRY(vshi_heights, heights, vshi_heights_create(&source, &run, &heights, fuzz_error()));
     return 0;
 }

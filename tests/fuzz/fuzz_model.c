@@ -1,8 +1,8 @@
-/* Mesh files, the whole way: our scanners, Assimp, our checks. The first byte chooses the format. What is
- * read must be a mesh that vsh_mesh_check() takes, and comes back lit where its document holds. */
+/* Mesh files pass our scanners, Assimp and our checks. The first byte chooses the format. A file that is read
+ * must be a mesh that vsh_mesh_check() accepts, and can be written with light. */
 #include "fuzz.h"
 
-#include <vdbshade/lit.h>
+#include <vdbshade/scene.h>
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,11 +13,8 @@ static void check(const vsh_model *model) {
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
         const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
         vsh_mesh_report report;
-        const vsh_result result = vsh_mesh_check(&mesh, &report, fuzz_error());
-        fuzz_ended_plain(result);
-        if (result != VSH_OK || mesh.triangle_count == 0) {
-            abort();
-        }
+        FUZZ_REQUIRE(fuzz_check_plain(vsh_mesh_check(&mesh, &report, fuzz_error())) == VSH_OK &&
+                     mesh.triangle_count > 0);
     }
 }
 
@@ -40,7 +37,7 @@ static void light(const char *path, const vsh_model *model, const vsh_run *run) 
         indices[i] = (uint32_t)i;
     }
     charts[0] = 1;
-    for (size_t i = 0; i < count; ++i) { /* its corners are copies of what they index */
+    for (size_t i = 0; i < count; ++i) { /* each corner is a copy of the vertex that it indexes */
         const vsh_mesh mesh = vsh_model_mesh(model, i, 0);
         meshes[i] = (vsh_lit_mesh){
             uvs, mesh.indices, indices, charts, 3 * mesh.triangle_count, mesh.triangle_count, 0, -1};
@@ -50,11 +47,9 @@ static void light(const char *path, const vsh_model *model, const vsh_run *run) 
     vsh_lit_options options = vsh_lit_options_default();
     options.chart_pages = pages;
     options.chart_count = 2;
-    const vsh_result result = vsh_lit_write(path, model, meshes, &options, output, run, fuzz_error());
-    fuzz_ended_plain(result);
-    if ((unlink(output) == 0) != (result == VSH_OK)) {
-        abort();
-    }
+    const vsh_result result =
+        fuzz_check_plain(vsh_lit_write(path, model, meshes, &options, output, run, fuzz_error()));
+    FUZZ_REQUIRE((unlink(output) == 0) == (result == VSH_OK));
     free(charts);
     free(indices);
     free(uvs);
@@ -70,9 +65,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *path = fuzz_file(name, data + 1, size - 1);
     const vsh_run run = fuzz_run();
     vsh_model *model;
-    const vsh_result result = vsh_model_read(path, &run, &model, fuzz_error());
-    fuzz_ended(result, model);
-    if (result == VSH_OK) {
+    if (FUZZ_MAKE(model, vsh_model_read(path, &run, &model, fuzz_error())) == VSH_OK) {
         check(model);
         light(path, model, &run);
     }

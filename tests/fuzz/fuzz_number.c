@@ -5,24 +5,23 @@
 #include "base/decimal.h"
 
 #include <math.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+
+static bool are_same(double a, double b) {
+    return memcmp(&a, &b, sizeof a) == 0 || (isnan(a) && isnan(b));
+}
 
 static void check_text(const char *text, size_t size) {
     char *copy = malloc(size + 1);
     double value;
-    if (copy == NULL) {
-        return;
-    }
     memcpy(copy, text, size);
     copy[size] = '\0';
     if (vshi_decimal_read(text, text + size, &value)) {
         char *end;
         const double expected = strtod(copy, &end);
-        if (*end != '\0' ||
-            (memcmp(&value, &expected, sizeof value) != 0 && !(isnan(value) && isnan(expected)))) {
-            abort();
-        }
+        FUZZ_REQUIRE(*end == '\0' && are_same(value, expected));
     }
     free(copy);
 }
@@ -34,17 +33,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     double number, back;
     fuzz_fill(&input, &number, sizeof number);
     char *end = vshi_decimal_write_double(text, number);
-    if (end > text + sizeof text || !vshi_decimal_read(text, end, &back) ||
-        (memcmp(&back, &number, sizeof back) != 0 && !(isnan(back) && isnan(number)))) {
-        abort();
-    }
+    FUZZ_REQUIRE(end <= text + sizeof text && vshi_decimal_read(text, end, &back) && are_same(back, number));
     const float single = (float)number;
     end = vshi_decimal_write_float(text, single);
-    const int read = vshi_decimal_read(text, end, &back);
-    const float again = (float)back;
-    if (end > text + sizeof text || !read ||
-        (memcmp(&again, &single, sizeof again) != 0 && !(isnan(again) && isnan(single)))) {
-        abort();
-    }
+    FUZZ_REQUIRE(end <= text + sizeof text && vshi_decimal_read(text, end, &back));
+    FUZZ_REQUIRE(are_same((double)(float)back, (double)single));
     return 0;
 }

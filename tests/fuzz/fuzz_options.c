@@ -1,15 +1,23 @@
-/* Structs of what casts, of images and of comparisons, of any bytes: a code comes back, and no crash. */
+/* Calls that make casters, images and comparisons, with structs of any bytes: they return a code and do not
+ * crash. */
 #include "parts.h"
 
 #include <string.h>
+
+static void take_transform(fuzz_input *input, double transform[12]) {
+    for (int i = 0; i < 12; ++i) {
+        transform[i] = i % 5 == 0;
+    }
+    fuzz_take(input, transform, 12 * sizeof *transform);
+}
 
 static void grid(fuzz_input *input) {
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = 8;
     fuzz_take(input, &options, sizeof options);
     const vsh_run run = fuzz_take_run(input);
-    double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    fuzz_take(input, transform, sizeof transform);
+    double transform[12];
+    take_transform(input, transform);
     float positions[24];
     memcpy(positions, fuzz_corners, sizeof positions);
     fuzz_take(input, positions, sizeof positions);
@@ -23,11 +31,11 @@ static void grid(fuzz_input *input) {
     vsh_grid *result;
     FUZZ_MAKE(result, vsh_grid_from_meshes(&mesh, 1, &options, &run, &result, fuzz_error()));
     if (result != NULL) {
-        vsh_field_options wide = vsh_field_options_default();
+        vshi_field_options wide = vshi_field_options_default();
         fuzz_take(input, &wide, sizeof wide);
         vsh_field *field;
-        FUZZ_MAKE(field, vsh_field_create(result, &wide, &run, &field, fuzz_error()));
-        vsh_field_free(field);
+        FUZZ_MAKE(field, vshi_field_create(result, &wide, &run, &field, fuzz_error()));
+        vshi_field_free(field);
     }
     vsh_grid_free(result);
 }
@@ -36,15 +44,13 @@ static void unite(fuzz_input *input) {
     vsh_grid_options options = vsh_grid_options_default();
     fuzz_take(input, &options, sizeof options);
     const vsh_run run = fuzz_take_run(input);
-    double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    fuzz_take(input, transform, sizeof transform);
+    double transform[12];
+    take_transform(input, transform);
     const vsh_grid_instance instances[] = {{fuzz_made()->grid, NULL}, {fuzz_made()->grid, transform}};
-    vsh_grid *result;
-    FUZZ_MAKE(result, vsh_grid_unite(instances, 2, &options, &run, &result, fuzz_error()));
-    vsh_grid_free(result);
-    FUZZ_MAKE(result, vsh_grid_from_outline(fuzz_made()->outline, transform[3], transform, &options, &run,
-                                            &result, fuzz_error()));
-    vsh_grid_free(result);
+    FUZZ_TRY(vsh_grid, result, vsh_grid_unite(instances, 2, &options, &run, &result, fuzz_error()));
+    FUZZ_TRY(vsh_grid, result,
+             vsh_grid_from_outline(fuzz_made()->outline, transform[3], transform, &options, &run, &result,
+                                   fuzz_error()));
 }
 
 static void sdf(fuzz_input *input) {
@@ -62,13 +68,11 @@ static void sdf(fuzz_input *input) {
     options.resolution = 8;
     fuzz_take(input, &options, sizeof options);
     const vsh_run run = fuzz_take_run(input);
-    vsh_grid *result;
-    FUZZ_MAKE(result, vsh_grid_from_sdf(&tree, &options, &run, &result, fuzz_error()));
-    vsh_grid_free(result);
-    vsh_solids *solids;
-    double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    fuzz_take(input, transform, sizeof transform);
-    FUZZ_MAKE(solids, vsh_solids_create(&tree, transform, 1, &solids, fuzz_error()));
+    FUZZ_TRY(vsh_grid, result, vsh_grid_from_sdf(&tree, &options, &run, &result, fuzz_error()));
+    vshi_solids *solids;
+    double transform[12];
+    take_transform(input, transform);
+    FUZZ_MAKE(solids, vshi_solids_create(&tree, transform, 1, &solids, fuzz_error()));
     if (solids != NULL) {
         double position[3] = {1, 1, 1}, lift = 0.01;
         float normal[3] = {0, 1, 0}, value;
@@ -78,11 +82,11 @@ static void sdf(fuzz_input *input) {
         const vsh_light light = fuzz_take_light(input);
         int32_t rays = 4;
         fuzz_take(input, &rays, sizeof rays);
-        fuzz_ended_plain(vsh_trace_shadow(NULL, solids, 1, position, normal, lift, &light, rays, &run, &value,
-                                          fuzz_error()));
-        vsh_solids_distance(solids, position);
+        fuzz_check_plain(vshi_trace_shadow(NULL, solids, 1, position, normal, lift, &light, rays, &run,
+                                           &value, fuzz_error()));
+        vshi_solids_distance(solids, position);
     }
-    vsh_solids_free(solids);
+    vshi_solids_free(solids);
 }
 
 static void heights(fuzz_input *input) {
@@ -91,8 +95,8 @@ static void heights(fuzz_input *input) {
     float values[FUZZ_SIDE * FUZZ_SIDE];
     memcpy(values, fuzz_heights, sizeof values);
     fuzz_take(input, values, sizeof values);
-    double transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    fuzz_take(input, transform, sizeof transform);
+    double transform[12];
+    take_transform(input, transform);
     const vsh_run run = fuzz_take_run(input);
     source.name = "heights";
     source.values = values;
@@ -101,19 +105,13 @@ static void heights(fuzz_input *input) {
         source.columns = FUZZ_SIDE; /* the array's length is the caller's promise */
         source.rows = FUZZ_SIDE;
     }
-    vsh_heights *result;
-    FUZZ_MAKE(result, vsh_heights_create(&source, &run, &result, fuzz_error()));
-    vsh_heights_free(result);
+    FUZZ_TRY(vshi_heights, result, vshi_heights_create(&source, &run, &result, fuzz_error()));
     int32_t what = 0;
     fuzz_take(input, &what, sizeof what);
-    vsh_model *model;
-    FUZZ_MAKE(model, vsh_model_from_heights(&source, what, &run, &model, fuzz_error()));
-    vsh_model_free(model);
+    FUZZ_TRY(vsh_model, model, vsh_model_from_heights(&source, what, &run, &model, fuzz_error()));
     double balls[8] = {0, 0, 0, 1, 2, 0, 0, 1};
     fuzz_take(input, balls, sizeof balls);
-    vsh_spheres *spheres;
-    FUZZ_MAKE(spheres, vsh_spheres_create(balls, 2, transform, &run, &spheres, fuzz_error()));
-    vsh_spheres_free(spheres);
+    FUZZ_TRY(vshi_spheres, spheres, vshi_spheres_create(balls, 2, transform, &run, &spheres, fuzz_error()));
 }
 
 static void image(fuzz_input *input) {
@@ -155,11 +153,11 @@ static void image(fuzz_input *input) {
     if (name[0] != '\0') {
         strcpy(path, fuzz_file(name, "", 0));
     }
-    fuzz_ended_plain(vsh_image_check(path, &what, &options, fuzz_error()));
-    vsh_image_writer_bytes(path, &what, &options);
+    fuzz_check_plain(vsh_image_check(path, &what, &options, fuzz_error()));
+    vshi_image_writer_bytes(path, &what, &options);
     const int64_t pixels_in = (int64_t)what.width * what.height;
     if (what.width <= 16 && pixels_in <= 16) {
-        fuzz_ended_plain(vsh_image_write(path, &what, &options, fuzz_error()));
+        fuzz_check_plain(vsh_image_write(path, &what, &options, fuzz_error()));
     }
 }
 
@@ -171,7 +169,7 @@ static void mask(fuzz_input *input) {
         static const char *const name = "Y";
         const vsh_image picture = {4, 4, 1, &name, &plane, NULL};
         strcpy(path, fuzz_file("mask.exr", "", 0));
-        fuzz_must(vsh_image_write(path, &picture, NULL, NULL));
+        FUZZ_MUST(vsh_image_write(path, &picture, NULL, NULL));
     }
     vsh_mask_options options = vsh_mask_options_default();
     fuzz_take(input, &options, sizeof options);
@@ -179,15 +177,13 @@ static void mask(fuzz_input *input) {
     fuzz_take(input, channel, sizeof channel - 1);
     options.channel = fuzz_byte(input) & 1 ? channel : NULL;
     const vsh_run run = fuzz_take_run(input);
-    vsh_outline *outline;
-    FUZZ_MAKE(outline, vsh_outline_from_image(path, &options, &run, &outline, fuzz_error()));
-    vsh_outline_free(outline);
+    FUZZ_TRY(vsh_outline, outline, vshi_outline_from_image(path, &options, &run, &outline, fuzz_error()));
     vsh_text_options letters = vsh_text_options_default();
     fuzz_take(input, &letters, sizeof letters);
     char text[24] = "text";
     fuzz_take(input, text, sizeof text - 1);
-    FUZZ_MAKE(outline, vsh_outline_from_text(text, path, &letters, &run, &outline, fuzz_error()));
-    vsh_outline_free(outline);
+    FUZZ_TRY(vsh_outline, outline,
+             vshi_outline_from_text(text, path, &letters, &run, &outline, fuzz_error()));
 }
 
 static void compare(fuzz_input *input) {
@@ -211,12 +207,10 @@ static void compare(fuzz_input *input) {
         return; /* the arrays' length is the caller's promise */
     }
     vsh_measures measures;
-    const vsh_result result = vsh_compare(&compared, &options, &run, &measures, fuzz_error());
-    fuzz_ended_plain(result);
-    if (result == VSH_OK) {
-        vsh_limits limits = vsh_limits_default();
+    if (fuzz_check_plain(vsh_compare(&compared, &options, &run, &measures, fuzz_error())) == VSH_OK) {
+        vsh_limits limits = vshi_limits_default();
         fuzz_take(input, &limits, sizeof limits);
-        vsh_compare_judge(&measures, &limits);
+        vshi_compare_judge(&measures, &limits);
     }
 }
 

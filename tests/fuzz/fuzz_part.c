@@ -1,9 +1,9 @@
-/* Parts of bakes, merged: those that the library made when this began, changed in some places, or any bytes.
- * Their sums are made those of what is there: else no input would come farther than them. The first
- * byte chooses the bake and the part, the second how the others are taken. */
+/* Merges parts of bakes: parts that the library made at the start, changed in some places, or any bytes.
+ * Their checksums are corrected, because merging stops at a wrong one. The first byte chooses the bake and
+ * the part, the second how to use the others. */
 #include "fuzz.h"
 
-#include "bake_scene/parts.h"
+#include "bake_scene/bake_scene.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -31,7 +31,7 @@ static const char *const scenes[] = {
 
 enum { KINDS = sizeof scenes / sizeof scenes[0] };
 
-/* What parts are of. */
+/* A scene, and the parts of its bake. */
 typedef struct source {
     vsh_scene *scene;
     char name[512];
@@ -41,21 +41,13 @@ typedef struct source {
 
 static source sources[KINDS];
 
-static void must(vsh_result result, const vsh_error *error) {
-    if (result != VSH_OK) {
-        fprintf(stderr, "fuzz: %s\n", error->message);
-        abort();
-    }
-}
-
-/* --- what is there before the first input */
+/* --- scenes and parts, made before the first input */
 
 static void bake_scene(source *s, int kind) {
     char file[32];
-    vsh_error error;
     snprintf(file, sizeof file, "%d.json", kind);
-    must(vsh_scene_read(fuzz_file(file, scenes[kind], strlen(scenes[kind])), NULL, &s->scene, &error),
-         &error);
+    const char *const path = fuzz_file(file, scenes[kind], strlen(scenes[kind]));
+    FUZZ_REQUIRE(vsh_scene_read(path, NULL, &s->scene, NULL) == VSH_OK);
     for (int32_t shard = 1; shard <= SHARDS; ++shard) {
         static const char *const words[] = {"bake", "a b"};
         vsh_bake_options options = vsh_bake_options_default();
@@ -64,7 +56,7 @@ static void bake_scene(source *s, int kind) {
         options.parts = s->name;
         options.words = words;
         options.word_count = 2;
-        must(vsh_bake_scene(s->scene, &options, NULL, NULL, &error), &error);
+        FUZZ_REQUIRE(vsh_bake_scene(s->scene, &options, NULL, NULL, NULL) == VSH_OK);
     }
 }
 
@@ -73,9 +65,7 @@ static void load(source *s, int shard) {
     snprintf(path, sizeof path, "%s.%d-of-%d.part", s->name, shard + 1, SHARDS);
     FILE *file = fopen(path, "rb");
     s->bytes[shard] = malloc(MOST);
-    if (file == NULL || s->bytes[shard] == NULL) {
-        abort();
-    }
+    FUZZ_REQUIRE(file != NULL && s->bytes[shard] != NULL);
     s->size[shard] = fread(s->bytes[shard], 1, MOST, file);
     fclose(file);
 }
@@ -142,9 +132,6 @@ static void forge_sum(part *p) {
 static part make_part(fuzz_input *input, const source *s, int shard) {
     const uint8_t how = fuzz_byte(input);
     part p = {malloc(MOST), 0};
-    if (p.at == NULL) {
-        abort();
-    }
     if (how % 8 == 7 && input->left <= MOST) {
         p.size = input->left;
         fuzz_fill(input, p.at, p.size);
@@ -166,10 +153,8 @@ static part make_part(fuzz_input *input, const source *s, int shard) {
 static vsh_result count_rows(void *user, const vsh_scene_lightmap *lightmap, const vsh_image *image,
                              int32_t first, int32_t count, const float *const *planes, vsh_error *error) {
     int32_t *rows = user;
-    if (lightmap->width != WIDTH || image->width != WIDTH || image->height != HEIGHT || planes[0] == NULL ||
-        first + count > HEIGHT) {
-        abort();
-    }
+    FUZZ_REQUIRE(lightmap->width == WIDTH && image->width == WIDTH && image->height == HEIGHT);
+    FUZZ_REQUIRE(planes[0] != NULL && first + count <= HEIGHT);
     *rows = first + count;
     return VSH_OK;
 }
@@ -181,22 +166,16 @@ static void merge_lightmaps(const source *s) {
     options.rows = count_rows;
     options.user = &rows;
     options.parts = s->name;
-    const vsh_result result = vsh_merge_scene(s->scene, &options, &run, NULL, fuzz_error());
-    fuzz_ended_plain(result);
-    if (result == VSH_OK && rows != HEIGHT) {
-        abort();
-    }
+    const vsh_result result = fuzz_check_plain(vsh_merge_scene(s->scene, &options, &run, NULL, fuzz_error()));
+    FUZZ_REQUIRE(result != VSH_OK || rows == HEIGHT);
 }
 
 static void read_words(const source *s) {
     const vsh_run run = fuzz_run();
     char **words = NULL;
     size_t count = 0;
-    const vsh_result result = vsh_part_words(s->name, 0, &run, &words, &count, fuzz_error());
-    fuzz_ended(result, words);
-    if (words != NULL && words[count] != NULL) {
-        abort();
-    }
+    FUZZ_MAKE(words, vsh_part_words(s->name, 0, &run, &words, &count, fuzz_error()));
+    FUZZ_REQUIRE(words == NULL || words[count] == NULL);
     vsh_part_words_free(words);
 }
 

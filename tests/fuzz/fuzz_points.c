@@ -1,14 +1,9 @@
 /* Point files of every format: read in small batches, kept or not, and written with answers beside them, as
- * the query command does. The first byte chooses formats and how. What is written in full must be read again
- * without a bad row more. */
+ * the query command does. The first byte chooses formats and how. A file that is written in full must be read
+ * again without another bad row. */
 #include "fuzz.h"
 
-#include "cli/message.h"
 #include "cli/query/points.h"
-
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 enum { ROWS = 7, MOST_KEPT = 256 };
 
@@ -67,10 +62,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     cli_points_reader reader;
     int code = cli_points_open(fuzz_file("in", data + 1, size - 1), from, normals, strict, &reader);
     code = code == CLI_OK ? copy(&reader, to, answers_only, output) : code;
-    if (code != CLI_OK && code != CLI_USAGE && code != CLI_FILE && code != CLI_LIMIT &&
-        code != CLI_INTERRUPTED) {
-        abort();
-    }
+    FUZZ_REQUIRE(code == CLI_OK || code == CLI_USAGE || code == CLI_FILE || code == CLI_LIMIT ||
+                 code == CLI_INTERRUPTED);
     if (code == CLI_OK && !answers_only && from != to && to != VSHI_TABLE_RAW) {
         read_back(output, to, &reader);
     }

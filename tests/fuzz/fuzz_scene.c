@@ -5,11 +5,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *path = fuzz_file("a.json", data, size);
-    vsh_scene *scene;
-    FUZZ_MAKE(scene, vsh_scene_read(path, NULL, &scene, fuzz_error()));
-    vsh_scene_free(scene);
-    vsh_flat_scene *flat;
-    FUZZ_MAKE(flat, vsh_flat_scene_read(path, NULL, &flat, fuzz_error()));
-    vsh_flat_scene_free(flat);
+    FUZZ_TRY(vsh_scene, scene, vsh_scene_read(path, NULL, &scene, fuzz_error()));
+    FUZZ_TRY(vsh_flat_scene, flat, vsh_flat_scene_read(path, NULL, &flat, fuzz_error()));
     return 0;
 }

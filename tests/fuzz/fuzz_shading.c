@@ -1,4 +1,4 @@
-/* Structs of what is shaded and baked, of any bytes: a code comes back, and no crash. */
+/* Calls that shade and bake, with structs of any bytes: they return a code and do not crash. */
 #include "parts.h"
 
 #include <string.h>
@@ -31,12 +31,13 @@ static void shade(fuzz_input *input) {
     const vsh_points points = {POINTS, positions, how & 1 ? normals : NULL, how & 2 ? texels : NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
     fuzz_take(input, &stats, sizeof stats.struct_size);
-    fuzz_ended_plain(vsh_shade_shadow(occluders, &points, &light, &options, &run, values,
-                                      how & 4 ? deviation : NULL, &stats, fuzz_error()));
-    fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, values, how & 4 ? deviation : NULL,
-                                  NULL, &stats, fuzz_error()));
-    fuzz_ended_plain(vsh_shade_ao(occluders, &points, &options, &run, ao, how & 4 ? deviation : NULL, values,
-                                  &stats, fuzz_error()));
+    float *const error = how & 4 ? deviation : NULL;
+    fuzz_check_plain(
+        vsh_shade_shadow(occluders, &points, &light, &options, &run, values, error, &stats, fuzz_error()));
+    fuzz_check_plain(
+        vsh_shade_ao(occluders, &points, &options, &run, values, error, NULL, &stats, fuzz_error()));
+    fuzz_check_plain(
+        vsh_shade_ao(occluders, &points, &options, &run, ao, error, values, &stats, fuzz_error()));
     fuzz_free_occluders(occluders);
 }
 
@@ -78,7 +79,7 @@ static void query(fuzz_input *input) {
     output.gradient = how & 128 ? gradient : NULL;
     fuzz_fill(input, positions, 3 * POINTS * sizeof *positions);
     fuzz_fill(input, normals, 3 * POINTS * sizeof *normals);
-    fuzz_ended_plain(vsh_query_points(made_query, &points, &layout, &run, &output, NULL, fuzz_error()));
+    fuzz_check_plain(vsh_query_points(made_query, &points, &layout, &run, &output, NULL, fuzz_error()));
 done:
     vsh_query_free(made_query);
     fuzz_free_occluders(occluders);
@@ -98,9 +99,7 @@ static void lightmap(fuzz_input *input) {
     vsh_charts *charts;
     FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error()));
     if (charts != NULL) {
-        vsh_texels *texels;
-        FUZZ_MAKE(texels, vsh_texels_create(charts, &run, &texels, fuzz_error()));
-        vsh_texels_free(texels);
+        FUZZ_TRY(vshi_texels, texels, vshi_texels_create(charts, &run, &texels, fuzz_error()));
     }
     if (charts != NULL && FITS(options)) {
         static float planes[8][3 * MOST_TEXELS];
@@ -126,7 +125,7 @@ static void lightmap(fuzz_input *input) {
         map.ambient = how & 32 ? ambient : NULL;
         map.invalid = how & 64 ? planes[6] : NULL;
         map.sky = how & 128 ? planes[7] : NULL;
-        fuzz_ended_plain(
+        fuzz_check_plain(
             vsh_bake_lightmap(occluders, charts, &light, 1, &shading, &run, &map, NULL, fuzz_error()));
         fuzz_free_occluders(occluders);
     }
@@ -145,10 +144,9 @@ static void volume(fuzz_input *input) {
     fuzz_take(input, &size, sizeof size);
     vsh_voxels *voxels;
     FUZZ_MAKE(voxels, vsh_voxels_from_box(box, box + 3, size, &run, &voxels, fuzz_error()));
-    vsh_volume *baked;
-    FUZZ_MAKE(baked, vsh_bake_volume(occluders, voxels != NULL ? voxels : fuzz_made()->voxels, &light, 1,
-                                     &options, &run, &baked, NULL, fuzz_error()));
-    vsh_volume_free(baked);
+    FUZZ_TRY(vsh_volume, baked,
+             vsh_bake_volume(occluders, voxels != NULL ? voxels : fuzz_made()->voxels, &light, 1, &options,
+                             &run, &baked, NULL, fuzz_error()));
     fuzz_free_occluders(occluders);
     vsh_voxels_free(voxels);
     fuzz_take(input, &size, sizeof size);
@@ -161,7 +159,7 @@ static void render(fuzz_input *input) {
     options.width = options.height = FUZZ_SIDE;
     options.samples = 1;
     fuzz_take(input, &options, sizeof options);
-    options.lit = NULL; /* a count of what is not there is refused */
+    options.lit = NULL; /* a count without an array is refused */
     vsh_occluders *occluders = fuzz_take_occluders(input);
     const vsh_run run = fuzz_take_run(input);
     const vsh_light light = fuzz_take_light(input);
@@ -190,7 +188,7 @@ static void render(fuzz_input *input) {
         vsh_camera camera = options.camera;
         const vsh_result framed =
             vsh_camera_frame(&camera, bounds, bounds + 3, angles[0], angles[1], angles[2], fuzz_error());
-        fuzz_ended_plain(framed);
+        fuzz_check_plain(framed);
         if (framed == VSH_OK) {
             vsh_camera_orbit(&camera, angles[0]);
             options.camera = camera;
@@ -198,11 +196,11 @@ static void render(fuzz_input *input) {
     }
     const int fits = FITS(options);
     const vsh_picture none = {NULL, NULL, NULL, NULL};
-    fuzz_ended_plain(vsh_render(&surface, 1, occluders, &light, 1, &options, &run, fits ? &picture : &none,
+    fuzz_check_plain(vsh_render(&surface, 1, occluders, &light, 1, &options, &run, fits ? &picture : &none,
                                 NULL, fuzz_error()));
     fuzz_free_occluders(occluders);
     float *const rgb[] = {planes[1], planes[2], planes[3]};
-    fuzz_ended_plain(vsh_picture_encode(&picture, FUZZ_SIDE, FUZZ_SIDE, angles[2], rgb, NULL, fuzz_error()));
+    fuzz_check_plain(vsh_picture_encode(&picture, FUZZ_SIDE, FUZZ_SIDE, angles[2], rgb, NULL, fuzz_error()));
 }
 
 static void flat(fuzz_input *input) {
@@ -224,13 +222,12 @@ static void flat(fuzz_input *input) {
     vsh_outline *outline;
     FUZZ_MAKE(outline, vsh_outline_from_polygons(points, counts, 1 + fuzz_byte(input) % 3, &run, &outline,
                                                  fuzz_error()));
-    fuzz_ended_plain(vsh_flat_bake(outline, lights, 2, &options, &run, &map, fuzz_error()));
+    fuzz_check_plain(vshi_flat_bake(outline, lights, 2, &options, &run, &map, fuzz_error()));
     vsh_outline_free(outline);
     double matrix[6] = {1, 0, 0, 0, 1, 0};
     fuzz_take(input, matrix, sizeof matrix);
-    const vsh_outline_instance instances[] = {{fuzz_made()->outline, matrix}, {fuzz_made()->outline, NULL}};
-    FUZZ_MAKE(outline, vsh_outline_unite(instances, 2, &run, &outline, fuzz_error()));
-    vsh_outline_free(outline);
+    const vshi_outline_instance instances[] = {{fuzz_made()->outline, matrix}, {fuzz_made()->outline, NULL}};
+    FUZZ_TRY(vsh_outline, both, vshi_outline_unite(instances, 2, &run, &both, fuzz_error()));
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

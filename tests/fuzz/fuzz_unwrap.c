@@ -2,11 +2,9 @@
  * few, so that vertices, edges and triangles fall on each other. */
 #include "fuzz.h"
 
-#include <vdbshade/unwrap.h>
+#include <vdbshade/lightmap.h>
 
 #include <math.h>
-#include <stdbool.h>
-#include <stdlib.h>
 
 enum { MOST_MESHES = 3, MOST_VERTICES = 48, MOST_TRIANGLES = 64 };
 
@@ -48,35 +46,31 @@ static vsh_mesh take_mesh(fuzz_input *input, arrays *a) {
     return mesh;
 }
 
-static void expect(bool holds) {
-    if (!holds) {
-        abort();
-    }
-}
-
 static void check_mesh(const vsh_atlas *atlas, const vsh_mesh *mesh, size_t index) {
     const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, index);
-    expect(placed.triangle_count == mesh->triangle_count);
+    FUZZ_REQUIRE(placed.triangle_count == mesh->triangle_count);
     for (size_t v = 0; v < placed.vertex_count; ++v) {
-        expect(placed.sources[v] < mesh->vertex_count);
+        FUZZ_REQUIRE(placed.sources[v] < mesh->vertex_count);
         for (size_t k = 0; k < 2; ++k) {
-            expect(placed.uvs[2 * v + k] >= 0.0f && placed.uvs[2 * v + k] <= 1.0f);
+            FUZZ_REQUIRE(placed.uvs[2 * v + k] >= 0.0f && placed.uvs[2 * v + k] <= 1.0f);
         }
     }
+    vsh_atlas_info info;
+    vsh_atlas_get_info(atlas, &info);
     for (size_t t = 0; t < placed.triangle_count; ++t) {
         const uint32_t *corners = placed.indices + 3 * t, chart = placed.charts[t];
         for (size_t k = 0; k < 3; ++k) {
-            expect(corners[k] < placed.vertex_count);
-            expect(placed.sources[corners[k]] == mesh->indices[3 * t + k]);
+            FUZZ_REQUIRE(corners[k] < placed.vertex_count);
+            FUZZ_REQUIRE(placed.sources[corners[k]] == mesh->indices[3 * t + k]);
         }
         if (chart == VSH_NO_CHART) {
             continue;
         }
-        expect(chart < vsh_atlas_chart_count(atlas) && vsh_atlas_charts(atlas)[chart].mesh == index);
+        FUZZ_REQUIRE(chart < info.charts && vsh_atlas_charts(atlas)[chart].mesh == index);
         const float *a = placed.uvs + 2 * (size_t)corners[0], *b = placed.uvs + 2 * (size_t)corners[1],
                     *c = placed.uvs + 2 * (size_t)corners[2];
-        expect(((double)b[0] - (double)a[0]) * ((double)c[1] - (double)a[1]) >=
-               ((double)b[1] - (double)a[1]) * ((double)c[0] - (double)a[0]));
+        FUZZ_REQUIRE(((double)b[0] - (double)a[0]) * ((double)c[1] - (double)a[1]) >=
+                     ((double)b[1] - (double)a[1]) * ((double)c[0] - (double)a[0]));
     }
 }
 
@@ -108,10 +102,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     for (size_t i = 0; atlas != NULL && i < count; ++i) {
         check_mesh(atlas, &meshes[i], i);
     }
-    for (size_t i = 0; atlas != NULL && i < vsh_atlas_chart_count(atlas); ++i) {
+    vsh_atlas_info info = {.charts = 0};
+    if (atlas != NULL) {
+        vsh_atlas_get_info(atlas, &info);
+    }
+    for (size_t i = 0; i < info.charts; ++i) {
         const vsh_atlas_chart *chart = &vsh_atlas_charts(atlas)[i];
-        expect(chart->page < vsh_atlas_page_count(atlas) && chart->min[0] >= 0 && chart->min[1] >= 0);
-        expect(chart->max[0] <= options.width && chart->max[1] <= options.height);
+        FUZZ_REQUIRE(chart->page < info.pages && chart->min[0] >= 0 && chart->min[1] >= 0);
+        FUZZ_REQUIRE(chart->max[0] <= options.width && chart->max[1] <= options.height);
     }
     vsh_atlas_free(atlas);
     return 0;

@@ -1,9 +1,9 @@
-/* Pages of any mesh file, of any names: one is written whole, or a reason is given. What strangers name stays
- * within the text that the page's script reads, and its scripts are the page's own. The first byte chooses
- * the format, the second how many of the bytes are a name. */
+/* Pages of any mesh file, with any names: a page is written whole, or a reason is given. Names stay within
+ * the text that the page's script reads. They add no script. The first byte chooses the format, the second
+ * how many of the bytes are a name. */
 #include "fuzz.h"
 
-#include <vdbshade/view.h>
+#include <vdbshade/picture.h>
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -24,15 +24,11 @@ static size_t count_of(const char *text, const char *what) {
 static char *read_page(const char *path) {
     FILE *file = fopen(path, "rb");
     char *text = malloc(MOST_PAGE);
-    if (file == NULL || text == NULL) {
-        abort();
-    }
+    FUZZ_REQUIRE(file != NULL && text != NULL);
     const size_t size = fread(text, 1, MOST_PAGE - 1, file);
     text[size] = '\0';
     fclose(file);
-    if (strlen(text) != size) {
-        abort();
-    }
+    FUZZ_REQUIRE(strlen(text) == size);
     return text;
 }
 
@@ -41,15 +37,12 @@ static void check_page(const char *path) {
     static size_t own; /* scripts of a page but for its data: the same for all */
     char *text = read_page(path);
     const char *begin = strstr(text, about);
-    if (begin == NULL || strncmp(strchr(begin + 1, '<'), "</script>\n<script>", 18) != 0) {
-        abort(); /* a name ends the text that it stands in: none has a line break that JSON leaves */
-    }
+    /* JSON leaves no line break in a name, so that none ends the text in which it stands. */
+    FUZZ_REQUIRE(begin != NULL && strncmp(strchr(begin + 1, '<'), "</script>\n<script>", 18) == 0);
     const size_t scripts = count_of(text, "<script>");
     own = own == 0 ? scripts : own;
-    if (scripts != own || scripts > OWN_SCRIPTS ||
-        strcmp(text + strlen(text) - 15, "</body></html>\n") != 0) {
-        abort();
-    }
+    FUZZ_REQUIRE(scripts == own && scripts <= OWN_SCRIPTS);
+    FUZZ_REQUIRE(strcmp(text + strlen(text) - 15, "</body></html>\n") == 0);
     free(text);
 }
 
@@ -79,13 +72,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (vsh_image_write(planes_file, &image, NULL, NULL) != VSH_OK) {
         return 0; /* a name that no channel can have */
     }
-    const vsh_result result = vsh_view_write(output, &bake, &other, &run, fuzz_error());
-    fuzz_ended_plain(result);
+    const vsh_result result = fuzz_check_plain(vsh_view_write(output, &bake, &other, &run, fuzz_error()));
     if (result == VSH_OK) {
         check_page(output);
     }
-    if ((unlink(output) == 0) != (result == VSH_OK)) {
-        abort();
-    }
+    FUZZ_REQUIRE((unlink(output) == 0) == (result == VSH_OK));
     return 0;
 }

@@ -1,6 +1,6 @@
-// Libraries that believe a size in a file ask for it: past the targets' memory limit they are refused here as
-// the confined reader's address space refuses them (sooner, for pages that are touched take time), and the
-// target goes on to what follows. (The sanitizer's own operator new ends the process.)
+// Libraries that trust a size in a file allocate it. Beyond the targets' memory limit this operator new
+// fails, as in the confined reader, and the target continues. The sanitizer's own operator new would end the
+// process.
 #include "fuzz.h"
 
 #include <cstdlib>

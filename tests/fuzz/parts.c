@@ -1,6 +1,5 @@
 #include "parts.h"
 
-#include <stdlib.h>
 #include <string.h>
 
 const float fuzz_corners[24] = {-1, -1, -1, 1, -1, -1, 1, 1, -1, -1, 1, -1,
@@ -9,12 +8,6 @@ const float fuzz_uvs[16] = {0, 0, 1, 0, 1, 1, 0, 1, 0.1f, 0.1f, 0.9f, 0.1f, 0.9f
 const uint32_t fuzz_indices[36] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
                                    3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
 const float fuzz_heights[FUZZ_SIDE * FUZZ_SIDE] = {0.5f, 1.0f, 0.25f};
-
-void fuzz_must(vsh_result result) {
-    if (result != VSH_OK) {
-        abort();
-    }
-}
 
 static fuzz_handles made;
 
@@ -29,21 +22,22 @@ static void make(void) {
     run.threads = 1;
     vsh_grid_options grid = vsh_grid_options_default();
     grid.resolution = 10;
-    fuzz_must(vsh_grid_from_meshes(&made.mesh, 1, &grid, &run, &made.grid, NULL));
-    vsh_field_options field = vsh_field_options_default();
+    FUZZ_MUST(vsh_grid_from_meshes(&made.mesh, 1, &grid, &run, &made.grid, NULL));
+    vshi_field_options field = vshi_field_options_default();
     field.reach = 2.0;
-    fuzz_must(vsh_field_create(made.grid, &field, &run, &made.field, NULL));
-    fuzz_must(vsh_occluders_from_grid(made.grid, &field, &run, &made.occluders, NULL));
+    FUZZ_MUST(vshi_field_create(made.grid, &field, &run, &made.field, NULL));
+    const vsh_occluders_options options = vsh_occluders_options_default();
+    FUZZ_MUST(vsh_occluders_from_grid(made.grid, &options, &run, &made.occluders, NULL));
     const double square[] = {-1, -1, 1, -1, 1, 1, -1, 1};
     const size_t counts[] = {4};
-    fuzz_must(vsh_outline_from_polygons(square, counts, 1, &run, &made.outline, NULL));
+    FUZZ_MUST(vsh_outline_from_polygons(square, counts, 1, &run, &made.outline, NULL));
     const double box_min[] = {-1, -1, -1}, box_max[] = {1, 1, 1};
-    fuzz_must(vsh_voxels_from_box(box_min, box_max, 0.5, &run, &made.voxels, NULL));
+    FUZZ_MUST(vsh_voxels_from_box(box_min, box_max, 0.5, &run, &made.voxels, NULL));
     const vsh_heights_source source = {
         .columns = FUZZ_SIDE, .rows = FUZZ_SIDE, .values = fuzz_heights, .size = {2, 2}, .height = 0.5};
-    fuzz_must(vsh_heights_create(&source, &run, &made.heights, NULL));
+    FUZZ_MUST(vshi_heights_create(&source, &run, &made.heights, NULL));
     const double balls[] = {0, 0, 0, 1, 2, 0, 0, 0.5};
-    fuzz_must(vsh_spheres_create(balls, 2, NULL, &run, &made.spheres, NULL));
+    FUZZ_MUST(vshi_spheres_create(balls, 2, NULL, &run, &made.spheres, NULL));
 }
 
 const fuzz_handles *fuzz_made(void) {
@@ -90,9 +84,9 @@ vsh_run fuzz_take_run(fuzz_input *input) {
     return run;
 }
 
-static void take_layer(fuzz_input *input, vsh_layer *layer) {
+static void take_layer(fuzz_input *input, vshi_layer *layer) {
     static const char *const lights[] = {"sun", "other"};
-    *layer = vsh_layer_default();
+    *layer = vshi_layer_default();
     fuzz_take(input, layer, sizeof *layer);
     const uint8_t which = fuzz_byte(input);
     layer->field = which % 4 == 0 ? made.field : NULL;
@@ -105,21 +99,21 @@ static void take_layer(fuzz_input *input, vsh_layer *layer) {
 }
 
 vsh_occluders *fuzz_take_occluders(fuzz_input *input) {
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
-    vsh_layer layer;
+    vshi_occluder_parts parts = {.field = NULL};
+    vshi_layer layer;
     fuzz_take(input, &parts, sizeof parts);
     const uint8_t how = fuzz_byte(input);
     parts.field = how & 1 ? NULL : made.field;
     parts.triangles = parts.true_triangles = NULL;
     parts.true_solids = NULL;
-    parts.layers = NULL; /* a count of what is not there is refused */
+    parts.layers = NULL; /* a count without an array is refused */
     if (how % 8 < 2) {
         take_layer(input, &layer);
         parts.layers = &layer;
         parts.layer_count = 1;
     }
     vsh_occluders *occluders;
-    FUZZ_MAKE(occluders, vsh_occluders_from_parts(&parts, &occluders, fuzz_error()));
+    FUZZ_MAKE(occluders, vshi_occluders_from_parts(&parts, &occluders, fuzz_error()));
     return occluders != NULL ? occluders : made.occluders;
 }
 

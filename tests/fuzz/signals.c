@@ -1,6 +1,6 @@
 /* Signals of the command line, for targets: an interrupt comes when the time of an input is over, and no
  * thread waits for one. */
-#include "cli/signals.h"
+#include "cli/cli.h"
 
 #include "fuzz.h"
 

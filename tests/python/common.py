@@ -1,4 +1,4 @@
-"""What the tests of the Python module share: a box over a floor, the sample asset, folders and programs."""
+"""Helpers of the Python module's tests: a box over a floor, the sample asset, folders and programs."""
 import os
 import pathlib
 import tempfile
@@ -43,7 +43,7 @@ def points_on_floor(count, seed=1):
 
 
 class Case(unittest.TestCase):
-    """A test in a folder of its own; what the library warns of is let pass."""
+    """A test in a folder of its own. Warnings of the library do not fail it."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -53,6 +53,11 @@ class Case(unittest.TestCase):
         caught.__enter__()
         self.addCleanup(caught.__exit__, None, None, None)
         warnings.simplefilter("ignore", vdbshade.VdbshadeWarning)
+
+    def refused(self, kind, message, function, *arguments, **options):
+        with self.assertRaisesRegex(kind, message) as caught:
+            function(*arguments, **options)
+        return caught.exception
 
     def assertSame(self, a, b):
         """The same bits."""

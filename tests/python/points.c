@@ -1,10 +1,11 @@
 /* The C side of tests that compare values with Python, and of `tools/bench FILE.csv calls`, which compares
- * times. points MODEL POINTS OUT: shadow, AO and distance at points (float64 positions, then float32 normals,
- * native) as floats. points MODEL POINTS time ROUNDS: processor seconds of a call for all of them, of each
- * round a line, and then nanoseconds of a call for one point: of a query, of a sample of a field, of
- * vsh_shade_shadow(). */
+ * times. `points MODEL POINTS OUT` writes shadow, AO and distance at points as floats. POINTS holds float64
+ * positions, then float32 normals, native. `points MODEL POINTS time ROUNDS` prints for each round the
+ * processor seconds of a call for all points. Then it prints the nanoseconds of a call for one point: of a
+ * query, of a sample of a field, of vsh_shade_shadow(). */
 #include <vdbshade/vdbshade.h>
 
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,46 +19,40 @@ static double seconds(void) {
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-static void stop(const char *what) {
-    fprintf(stderr, "points: %s\n", what);
-    exit(1);
+static void require(bool holds, const char *message) {
+    if (!holds) {
+        fprintf(stderr, "points: %s\n", message);
+        exit(1);
+    }
 }
 
-static void *taken(size_t size) {
+static void *allocate(size_t size) {
     void *memory = malloc(size > 0 ? size : 1);
-    if (memory == NULL) {
-        stop("out of memory");
-    }
+    require(memory != NULL, "out of memory");
     return memory;
 }
 
 static void *read_all(const char *path, size_t *count) {
     FILE *file = fopen(path, "rb");
-    if (file == NULL || fseek(file, 0, SEEK_END) != 0) {
-        stop("cannot read the points");
-    }
+    require(file != NULL && fseek(file, 0, SEEK_END) == 0, "cannot read the points");
     *count = (size_t)ftell(file) / POINT;
     rewind(file);
-    void *bytes = taken(*count * POINT);
-    if (fread(bytes, POINT, *count, file) != *count) {
-        stop("cannot read the points");
-    }
+    void *bytes = allocate(*count * POINT);
+    require(fread(bytes, POINT, *count, file) == *count, "cannot read the points");
     fclose(file);
     return bytes;
 }
 
 static void measure(const vsh_query *query, const vsh_occluders *occluders, const vsh_points *points,
                     const vsh_light *sun, const vsh_shade_options *shade, const vsh_run *run, int rounds) {
-    float *shadow = taken(points->count * sizeof *shadow);
+    float *shadow = allocate(points->count * sizeof *shadow);
     float *const planes[] = {shadow};
     vsh_query_output output = vsh_query_output_default();
     vsh_error error;
     output.visibility = planes;
     for (int round = 0; round < rounds; ++round) {
         const double begin = seconds();
-        if (vsh_query_points(query, points, NULL, run, &output, NULL, &error) != VSH_OK) {
-            stop(error.message);
-        }
+        require(vsh_query_points(query, points, NULL, run, &output, NULL, &error) == VSH_OK, error.message);
         printf("%.6f\n", seconds() - begin);
     }
     vsh_points one = *points;
@@ -67,11 +62,10 @@ static void measure(const vsh_query *query, const vsh_occluders *occluders, cons
         vsh_query_points(query, &one, NULL, run, &output, NULL, &error);
     }
     printf("%.1f\n", (seconds() - begin) / CALLS * 1e9);
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
-    vsh_occluders_get_parts(occluders, &parts);
+    const vsh_field *field = vsh_occluders_get_field(occluders, NULL);
     begin = seconds();
     for (int i = 0; i < CALLS; ++i) {
-        vsh_field_sample(parts.field, 1, points->positions, shadow);
+        vsh_field_sample(field, 1, points->positions, shadow);
     }
     printf("%.1f\n", (seconds() - begin) / CALLS * 1e9);
     begin = seconds();
@@ -83,37 +77,30 @@ static void measure(const vsh_query *query, const vsh_occluders *occluders, cons
 }
 
 static void write_values(const vsh_query *query, const vsh_points *points, const char *path) {
-    float *values = taken(3 * points->count * sizeof *values);
+    float *values = allocate(3 * points->count * sizeof *values);
     float *const planes[] = {values};
     vsh_query_output output = vsh_query_output_default();
     vsh_error error;
     output.visibility = planes;
     output.ao = values + points->count;
     output.distance = values + 2 * points->count;
-    if (vsh_query_points(query, points, NULL, NULL, &output, NULL, &error) != VSH_OK) {
-        stop(error.message);
-    }
+    require(vsh_query_points(query, points, NULL, NULL, &output, NULL, &error) == VSH_OK, error.message);
     FILE *file = fopen(path, "wb");
-    if (file == NULL || fwrite(values, 3 * sizeof *values, points->count, file) != points->count ||
-        fclose(file) != 0) {
-        stop("cannot write the values");
-    }
+    require(file != NULL && fwrite(values, 3 * sizeof *values, points->count, file) == points->count &&
+                fclose(file) == 0,
+            "cannot write the values");
     free(values);
 }
 
 int main(int argc, char **argv) {
-    if (argc < 4) {
-        stop("usage: points MODEL POINTS (OUT | time ROUNDS)");
-    }
+    require(argc >= 4, "usage: points MODEL POINTS (OUT | time ROUNDS)");
     vsh_error error;
     vsh_model *model = NULL;
     vsh_occluders *occluders = NULL;
     vsh_query *query = NULL;
-    if (vsh_model_read(argv[1], NULL, &model, &error) != VSH_OK) {
-        stop(error.message);
-    }
+    require(vsh_model_read(argv[1], NULL, &model, &error) == VSH_OK, error.message);
     const size_t mesh_count = vsh_model_mesh_count(model);
-    vsh_mesh *meshes = taken(mesh_count * sizeof *meshes);
+    vsh_mesh *meshes = allocate(mesh_count * sizeof *meshes);
     for (size_t i = 0; i < mesh_count; ++i) {
         meshes[i] = vsh_model_mesh(model, i, -1);
     }
@@ -125,10 +112,9 @@ int main(int argc, char **argv) {
     vsh_shade_options shade = vsh_shade_options_default();
     shade.method = VSH_SHADOW_CONE;
     shade.ao_method = VSH_AO_CONES;
-    if (vsh_occluders_create(meshes, mesh_count, &options, NULL, &occluders, &error) != VSH_OK ||
-        vsh_query_create(occluders, &sun, 1, &shade, &query, &error) != VSH_OK) {
-        stop(error.message);
-    }
+    require(vsh_occluders_create(meshes, mesh_count, &options, NULL, &occluders, &error) == VSH_OK &&
+                vsh_query_create(occluders, &sun, 1, &shade, &query, &error) == VSH_OK,
+            error.message);
     size_t count;
     char *bytes = read_all(argv[2], &count);
     const vsh_points points = {count, (const double *)(const void *)bytes,

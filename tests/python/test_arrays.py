@@ -5,7 +5,7 @@ import numpy
 
 import vdbshade
 from common import BOX, BOX_TRIANGLES, FLOOR_UVS, Case, box, floor, points_on_floor, sun
-from vdbshade._library import ffi
+from vdbshade._core import ffi
 
 
 def address(array):
@@ -35,7 +35,7 @@ class NoCopy(Case):
         self.assertAlmostEqual(mesh.check().area, 6.0, places=5)
 
     def test_points_are_read_where_they_lie(self):
-        """What C is given are the addresses of the caller's arrays, with gaps and without."""
+        """C gets the addresses of the caller's arrays, with gaps and without."""
         query = vdbshade.Query(vdbshade.Occluders(box(), resolution=32), sun(), method="cone")
         given = {}
 
@@ -78,12 +78,12 @@ class NoCopy(Case):
         self.assertSame(values, grid.values((0, 0, 0), (2, 3, 4)))
 
     def test_what_the_library_has_is_viewed_and_not_to_be_written(self):
-        texels = vdbshade.Charts(floor(), width=8, height=8).texels()
-        samples = texels.samples
-        self.assertEqual(samples["positions"].shape, (64, 3))
-        self.assertEqual(address(samples["positions"]), address(texels.samples["positions"]))
+        model = vdbshade.Model.from_heights(numpy.zeros((4, 4), numpy.float32), what="surface")
+        positions = model[0].positions
+        self.assertEqual(positions.shape, (16, 3))
+        self.assertEqual(address(positions), address(model[0].positions))
         with self.assertRaises(ValueError):
-            samples["positions"][0] = 0
+            positions[0] = 0
 
     def test_a_grid_is_depth_height_width(self):
         flat = vdbshade.Grid.from_sdf(vdbshade.Sdf("box", size=(2, 0.5, 1)), voxel_size=0.125)
@@ -96,10 +96,6 @@ class NoCopy(Case):
 
 
 class Refused(Case):
-    def refused(self, kind, message, function, *arguments, **options):
-        with self.assertRaisesRegex(kind, message):
-            function(*arguments, **options)
-
     def test_other_kinds_of_numbers(self):
         same = vdbshade.Mesh(BOX.tolist(), BOX_TRIANGLES.astype(numpy.int64))
         self.assertSame(same.positions, BOX)
@@ -164,7 +160,7 @@ class Refused(Case):
             found = query.points(empty, nothing, ao=True, gradient=True)
             self.assertEqual((found["shadow"].shape, found["ao"].shape, found["gradient"].shape), ((1, 0), (0,), (0, 3)))
         self.assertEqual(vdbshade.shade_ao(vdbshade.Occluders(box()), [], []).shape, (0,))
-        self.assertEqual(vdbshade.Field(vdbshade.Grid.from_meshes(box(), resolution=16)).sample([]).shape, (0,))
+        self.assertEqual(vdbshade.Occluders(box(), resolution=16).field.sample([]).shape, (0,))
         self.refused(vdbshade.InputError, "without a triangle", vdbshade.Grid.from_meshes, vdbshade.Mesh([], []))
         self.refused(vdbshade.ArgumentError, "no meshes", vdbshade.Occluders, [])
         self.refused(TypeError, "meshes: expected a vdbshade.Mesh", vdbshade.Occluders, [BOX])
@@ -173,14 +169,13 @@ class Refused(Case):
     def test_huge_sizes_are_refused_before_memory_is_taken(self):
         wide = numpy.broadcast_to(numpy.float32(0.5), (70000, 70000))
         self.refused(ValueError, "at most 65536 rows and columns", vdbshade.Model.from_heights, wide)
-        run = vdbshade.Run(memory_limit=2**30)
-        self.refused(vdbshade.LimitError, "memory", vdbshade.Charts(floor(), width=8192, height=8192).texels, run=run)
+        run = vdbshade.Run(memory_limit=2**16)
+        self.refused(vdbshade.LimitError, "memory", vdbshade.Charts, floor(), width=8192, height=8192, run=run)
         self.refused(vdbshade.ArgumentError, "width|65536", vdbshade.Charts, floor(), width=2**31 - 1, height=2**31 - 1)
         self.refused(ValueError, "width .*: too large", vdbshade.Charts, floor(), width=2**31, height=8)
         self.refused(vdbshade.LimitError, "memory|voxel", vdbshade.Grid.from_meshes, box(), voxel_size=1e-9)
         grid = vdbshade.Grid.from_meshes(box(), resolution=8)
         self.refused(ValueError, "sizes", grid.values, (0, 0, 0), (2**40, 1, 1))
-        self.refused(vdbshade.ArgumentError, "width", vdbshade.flat_bake, None, sun(), width=10**9, height=10**9)
         self.refused(vdbshade.ArgumentError, "width", vdbshade.render, [], vdbshade.Occluders(box()), width=10**9)
 
     def test_indices_out_of_range(self):
@@ -201,16 +196,10 @@ class Compared(Case):
         values[0, 0] = 0.5
         mask = golden == 0
         self.assertEqual(vdbshade.compare(golden, values, mask).value["max"], 0.5)
-        self.assertEqual(vdbshade.compare_judge(vdbshade.compare(golden, golden)), [])
-        self.assertIn("max", vdbshade.compare_judge(vdbshade.compare(golden, values)))
         mask[0, 0] = False
         self.assertEqual(vdbshade.compare(golden, values, mask).value["max"], 0.0)
-        coverage, both = vdbshade.compare_coverage(golden + 1, None)
-        self.assertEqual((coverage.both, both.dtype, both.sum()), (64, numpy.uint8, 64))
         accuracy = vdbshade.compare_accuracy([golden], [values])
         self.assertAlmostEqual(accuracy.rmse, 0.0625)
-        self.assertEqual(vdbshade.Limits(rmse=0.5).value["rmse"], 0.5)
-        self.assertGreater(vdbshade.Limits(noise=0.05).value["rmse"], vdbshade.Limits().value["rmse"])
 
     def test_images_come_back_as_they_were_written(self):
         random = numpy.random.default_rng(1)
@@ -221,17 +210,7 @@ class Compared(Case):
         self.assertSame(numpy.array(image["ao"]), planes["ao"])
         self.assertSame(numpy.array(image["bent.Y"]), numpy.ascontiguousarray(planes["bent"][:, :, 1]))
         self.assertEqual(image.attributes["made_by"], "a test")
-        with vdbshade.ImageWriter(self.folder / "b.exr", ["ao"], (5, 7), pack="channels") as writer:
-            writer.add({"ao": planes["ao"][:2]})
-            writer.add({"ao": planes["ao"][2:]})
-        self.assertSame(numpy.array(vdbshade.image_read(self.folder / "b.exr")["ao"]), planes["ao"])
-        before = (self.folder / "b.exr").read_bytes()
-        with self.assertRaises(ZeroDivisionError):
-            with vdbshade.ImageWriter(self.folder / "b.exr", ["ao"], (5, 7)) as writer:
-                writer.add({"ao": planes["ao"][:2] * 0})
-                1 / 0
-        self.assertEqual((self.folder / "b.exr").read_bytes(), before)
-        self.assertEqual([f.name for f in sorted(self.folder.iterdir())], ["a.exr", "b.exr"])
+        self.assertEqual([f.name for f in self.folder.iterdir()], ["a.exr"])
 
 
 if __name__ == "__main__":

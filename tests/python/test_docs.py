@@ -1,4 +1,4 @@
-"""What the documents show runs as it stands there: docs/python.md, the README's lightmap, the example that plots."""
+"""The code in the documents runs as it stands there: docs/python.md, the README's lightmap, the example that plots."""
 import io
 import os
 import re

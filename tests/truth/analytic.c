@@ -38,8 +38,7 @@ double truth_solid_distance(const truth_solid *solid, const double point[3]) {
     case TRUTH_TORUS:
         return hypot(hypot(p[0], p[2]) - solid->radius, p[1]) - solid->minor_radius;
     default: {
-        double outside = 0.0;
-        double inside = -INFINITY;
+        double outside = 0.0, inside = -INFINITY;
         for (int i = 0; i < 3; i++) {
             const double q = fabs(p[i]) - solid->half[i];
             outside += q > 0.0 ? q * q : 0.0;
@@ -80,8 +79,7 @@ static bool hit_sphere(const double q[3], const double d[3], double radius, doub
 }
 
 static bool hit_box(const double q[3], const double d[3], const double half[3], double limit) {
-    double enter = -INFINITY;
-    double leave = INFINITY;
+    double enter = -INFINITY, leave = INFINITY;
     for (int i = 0; i < 3; i++) {
         if (d[i] == 0.0) {
             if (fabs(q[i]) >= half[i]) {
@@ -89,8 +87,7 @@ static bool hit_box(const double q[3], const double d[3], const double half[3], 
             }
             continue;
         }
-        const double a = (-half[i] - q[i]) / d[i];
-        const double b = (half[i] - q[i]) / d[i];
+        const double a = (-half[i] - q[i]) / d[i], b = (half[i] - q[i]) / d[i];
         enter = fmax(enter, fmin(a, b));
         leave = fmin(leave, fmax(a, b));
     }
@@ -100,14 +97,11 @@ static bool hit_box(const double q[3], const double d[3], const double half[3], 
 /* A cylinder along `axis` about the origin of q, without caps beyond ±half: they lie inside other parts. */
 static bool hit_cylinder(const double q[3], const double d[3], int axis, double half, double radius,
                          double limit) {
-    const int j = (axis + 1) % 3;
-    const int k = (axis + 2) % 3;
+    const int j = (axis + 1) % 3, k = (axis + 2) % 3;
     const double a = d[j] * d[j] + d[k] * d[k];
-    double enter = -INFINITY;
-    double leave = INFINITY;
+    double enter = -INFINITY, leave = INFINITY;
     if (a > 0.0) {
-        const double b = q[j] * d[j] + q[k] * d[k];
-        const double cross = q[j] * d[k] - q[k] * d[j];
+        const double b = q[j] * d[j] + q[k] * d[k], cross = q[j] * d[k] - q[k] * d[j];
         const double square = radius * radius * a - cross * cross;
         if (square <= 0.0) {
             return false;
@@ -121,57 +115,44 @@ static bool hit_cylinder(const double q[3], const double d[3], int axis, double 
     if (d[axis] == 0.0) {
         return fabs(q[axis]) < half && meets(enter, leave, limit);
     }
-    const double s = (-half - q[axis]) / d[axis];
-    const double t = (half - q[axis]) / d[axis];
+    const double s = (-half - q[axis]) / d[axis], t = (half - q[axis]) / d[axis];
     return meets(fmax(enter, fmin(s, t)), fmin(leave, fmax(s, t)), limit);
 }
 
 /* A box grown by a radius is the union of three boxes, twelve cylinders and eight spheres: no iteration. */
 static bool hit_rounded_box(const double q[3], const double d[3], const double half[3], double radius,
                             double limit) {
-    double grown[3];
-    for (int axis = 0; axis < 3; axis++) {
-        grown[axis] = half[axis] + radius;
-    }
+    const double grown[3] = {half[0] + radius, half[1] + radius, half[2] + radius};
     if (!hit_box(q, d, grown, limit)) {
         return false;
     }
-    for (int axis = 0; axis < 3; axis++) {
+    bool hit = false;
+    for (int axis = 0; axis < 3 && !hit; axis++) {
         double part[3] = {half[0], half[1], half[2]};
         part[axis] = grown[axis];
-        if (hit_box(q, d, part, limit)) {
-            return true;
-        }
+        hit = hit_box(q, d, part, limit);
     }
-    for (int axis = 0; axis < 3; axis++) {
-        for (int corner = 0; corner < 4; corner++) {
-            double from[3] = {q[0], q[1], q[2]};
-            const int j = (axis + 1) % 3;
-            const int k = (axis + 2) % 3;
-            from[j] -= (corner & 1) != 0 ? half[j] : -half[j];
-            from[k] -= (corner & 2) != 0 ? half[k] : -half[k];
-            if (hit_cylinder(from, d, axis, half[axis], radius, limit)) {
-                return true;
-            }
-        }
+    for (int i = 0; i < 12 && !hit; i++) {
+        double from[3] = {q[0], q[1], q[2]};
+        const int axis = i / 4, j = (axis + 1) % 3, k = (axis + 2) % 3;
+        from[j] -= (i & 1) != 0 ? half[j] : -half[j];
+        from[k] -= (i & 2) != 0 ? half[k] : -half[k];
+        hit = hit_cylinder(from, d, axis, half[axis], radius, limit);
     }
-    for (int corner = 0; corner < 8; corner++) {
+    for (int corner = 0; corner < 8 && !hit; corner++) {
         double from[3];
         for (int i = 0; i < 3; i++) {
             from[i] = q[i] - (((corner >> i) & 1) != 0 ? half[i] : -half[i]);
         }
-        if (hit_sphere(from, d, radius, limit)) {
-            return true;
-        }
+        hit = hit_sphere(from, d, radius, limit);
     }
-    return false;
+    return hit;
 }
 
 /* Real roots of t³ + a t² + b t + c, by the trigonometric and Cardano forms (Press and others, "Numerical
  * recipes", 5.6), each bettered by Newton steps. */
 static int cubic_roots(double a, double b, double c, double roots[3]) {
-    const double q = (a * a - 3.0 * b) / 9.0;
-    const double r = (2.0 * a * a * a - 9.0 * a * b + 27.0 * c) / 54.0;
+    const double q = (a * a - 3.0 * b) / 9.0, r = (2.0 * a * a * a - 9.0 * a * b + 27.0 * c) / 54.0;
     int count = 1;
     if (r * r < q * q * q) {
         const double angle = acos(fmin(1.0, fmax(-1.0, r / sqrt(q * q * q))));
@@ -185,11 +166,8 @@ static int cubic_roots(double a, double b, double c, double roots[3]) {
     }
     for (int i = 0; i < count; i++) {
         for (int step = 0; step < 3; step++) {
-            const double t = roots[i];
-            const double slope = (3.0 * t + 2.0 * a) * t + b;
-            if (slope != 0.0) {
-                roots[i] -= (((t + a) * t + b) * t + c) / slope;
-            }
+            const double t = roots[i], slope = (3.0 * t + 2.0 * a) * t + b;
+            roots[i] -= slope != 0.0 ? (((t + a) * t + b) * t + c) / slope : 0.0;
         }
     }
     return count;
@@ -204,19 +182,16 @@ static bool hit_torus(const double q[3], const double d[3], double ring, double 
     for (int i = 0; i < 3; i++) {
         o[i] = q[i] + middle * d[i];
     }
-    const double outer = ring + tube;
-    const double square = outer * outer - dot(o, o);
+    const double square = (ring + tube) * (ring + tube) - dot(o, o);
     if (square <= 0.0) {
         return false;
     }
-    const double low = fmax(-middle, -sqrt(square));
-    const double high = fmin(limit - middle, sqrt(square));
+    const double low = fmax(-middle, -sqrt(square)), high = fmin(limit - middle, sqrt(square));
     if (low >= high) {
         return false;
     }
     /* |p|² = k + t², as o·d = 0. */
-    const double g = dot(o, o) + ring * ring - tube * tube;
-    const double four = 4.0 * ring * ring;
+    const double g = dot(o, o) + ring * ring - tube * tube, four = 4.0 * ring * ring;
     const double c2 = 2.0 * g - four * (d[0] * d[0] + d[2] * d[2]);
     const double c1 = -2.0 * four * (o[0] * d[0] + o[2] * d[2]);
     const double c0 = g * g - four * (o[0] * o[0] + o[2] * o[2]);
@@ -257,41 +232,19 @@ bool truth_hit(truth_scene scene, const double origin[3], const double direction
     return false;
 }
 
-/* Half size of the box around a solid. */
-static void bounding_box(const truth_solid *solid, double half[3]) {
-    for (int i = 0; i < 3; i++) {
-        half[i] = solid->shape == TRUTH_BOX ? solid->half[i] + solid->radius : solid->radius;
-    }
-    if (solid->shape == TRUTH_TORUS) {
-        half[0] = half[2] = solid->radius + solid->minor_radius;
-        half[1] = solid->minor_radius;
-    }
-}
-
-/* Whether the cone around unit `axis` of half angle `angle`, up to `limit`, may meet a solid: false where no
- * ray comes nearer along some axis than the solid's box, or near the sphere around that box. */
+/* Whether the cone around unit `axis` of half angle `angle`, up to `limit`, may meet a solid: it does not if
+ * it misses the sphere around the solid. */
 static bool cone_meets(const truth_solid *solid, const double point[3], const double axis[3], double angle,
                        double limit) {
     double to[3];
-    double half[3];
-    bounding_box(solid, half);
     for (int i = 0; i < 3; i++) {
         to[i] = solid->center[i] - point[i];
-        const double away = to[i] < 0.0 ? axis[i] : -axis[i]; /* sine of the axis' angle away from the box */
-        if (fabs(to[i]) >= half[i] && away >= sin(angle) + 1e-9) {
-            return false;
-        }
     }
-    const double length = sqrt(dot(to, to));
-    const double radius = sqrt(dot(half, half));
-    if (length <= radius) {
-        return true;
-    }
-    if (length - radius >= limit) {
-        return false;
-    }
-    const double between = acos(fmin(1.0, fmax(-1.0, dot(to, axis) / length)));
-    return between <= angle + asin(radius / length) + 1e-9;
+    const double length = sqrt(dot(to, to)),
+                 radius = solid->radius + solid->minor_radius + sqrt(dot(solid->half, solid->half));
+    return length <= radius ||
+           (length - radius < limit &&
+            acos(fmin(1.0, fmax(-1.0, dot(to, axis) / length))) <= angle + asin(radius / length) + 1e-9);
 }
 
 static truth_scene cull(truth_scene scene, const double point[3], const double axis[3], double angle,
@@ -321,10 +274,7 @@ static double free_share(truth_scene scene, const double point[3], const double 
     size_t seen = 0;
     for (size_t i = 0; i < rays; i++) {
         const double *direction = &directions[3 * i];
-        if (!risen && dot(normal, direction) <= 0.0) {
-            continue;
-        }
-        seen += truth_hit(near, point, direction, limit) ? 0 : 1;
+        seen += (risen || dot(normal, direction) > 0.0) && !truth_hit(near, point, direction, limit);
     }
     return (double)seen / (double)rays;
 }
@@ -365,7 +315,7 @@ double truth_ao(truth_scene scene, const double point[3], const double normal[3]
     for (size_t i = 0; i < rays; i++) {
         double direction[3];
         truth_cosine_direction(&frame, i, rays, direction);
-        open += truth_hit(near, point, direction, distance) ? 0 : 1;
+        open += !truth_hit(near, point, direction, distance);
     }
     return (double)open / (double)rays;
 }

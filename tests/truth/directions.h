@@ -10,10 +10,6 @@ typedef struct truth_frame {
 } truth_frame;
 truth_frame truth_frame_around(const double direction[3]);
 
-/* Point `index` of `count` in the unit disc, uniform in area: Vogel's spiral ("A better way to construct the
- * sunflower head", 1979), radii √((i+½)/n) so that every ring has its share. */
-void truth_disc_point(size_t index, size_t count, double point[2]);
-
 /* A direction given in a frame's axes, in the world. */
 void truth_to_world(const truth_frame *frame, const double local[3], double direction[3]);
 

@@ -22,8 +22,7 @@ static void world_position(const vsh_mesh *mesh, size_t vertex, double world[3])
 }
 
 static void find_center(const vsh_mesh *meshes, size_t mesh_count, double center[3]) {
-    double low[3] = {INFINITY, INFINITY, INFINITY};
-    double high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
     for (size_t m = 0; m < mesh_count; m++) {
         for (size_t v = 0; v < meshes[m].vertex_count; v++) {
             double world[3];

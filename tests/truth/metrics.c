@@ -5,8 +5,7 @@
 #include <stdlib.h>
 
 static int compare(const void *a, const void *b) {
-    const double x = *(const double *)a;
-    const double y = *(const double *)b;
+    const double x = *(const double *)a, y = *(const double *)b;
     return (x > y) - (x < y);
 }
 
@@ -22,9 +21,7 @@ truth_metrics truth_compare(size_t count, const float *values, const float *trut
     if (errors == NULL) {
         return metrics;
     }
-    double squares = 0.0;
-    double penumbra_squares = 0.0;
-    double sum = 0.0;
+    double squares = 0.0, penumbra_squares = 0.0, sum = 0.0;
     for (size_t i = 0; i < count; i++) {
         if (mask != NULL && !(mask[i] > 0.0F)) {
             continue;

@@ -1,4 +1,4 @@
-/* How far values are from the truth. RMSE alone hides lost penumbrae, so the rest stands beside it. */
+/* Differences of values from the truth. RMSE alone hides lost penumbrae, so there are other measures. */
 #ifndef TRUTH_METRICS_H
 #define TRUTH_METRICS_H
 

@@ -3,9 +3,8 @@
 #define TESTS_ASSETS_H
 
 #include "models.h"
-#include "testing.h"
 
-#include "base/uri.h"
+#include "base/text.h"
 #include "model/model.h"
 
 #include <jansson.h>
@@ -316,7 +315,7 @@ static inline void place_of(size_t mesh, size_t number, float uv[2]) {
     uv[1] = (float)((double)(number / 97) / 512.0);
 }
 
-/* `split`: every corner is a vertex of its own; else each vertex has one place. */
+/* `split`: every corner is a vertex of its own. */
 static inline vsh_lit_mesh make_lit(const vsh_model *model, size_t mesh, bool split) {
     const vsh_mesh view = vsh_model_mesh(model, mesh, 0);
     const size_t corners_count = 3 * view.triangle_count;

@@ -1,4 +1,4 @@
-/* What casts, of what a test made by hand: as long as the block that it stands in. */
+/* Occluders made of a test's own parts. They live as long as the block around them. */
 #ifndef TESTS_CASTS_H
 #define TESTS_CASTS_H
 

@@ -2,10 +2,8 @@
 #ifndef TESTS_FIELDS_H
 #define TESTS_FIELDS_H
 
-#include "testing.h"
+#include "handles.h"
 #include "truth/analytic.h"
-
-#include <vdbshade/field.h>
 
 enum { MAX_SOLIDS = 16 };
 
@@ -31,35 +29,18 @@ static inline vsh_grid *grid_of_moved(truth_scene scene, double voxel, double sc
         }
         nodes[count++] = node;
         if (last >= 0) {
-            vsh_sdf_node both = vsh_sdf_node_default();
-            both.shape = VSH_SDF_UNION;
-            both.left = last;
-            both.right = (int32_t)count - 1;
-            nodes[count++] = both;
+            const int32_t right = (int32_t)count - 1;
+            nodes[count++] = operation_node(VSH_SDF_UNION, last, right);
         }
         last = (int32_t)count - 1;
     }
     const vsh_sdf sdf = {nodes, count};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = scale * voxel;
-    vsh_grid *grid = NULL;
-    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
-    return grid;
+    return grid_from_sdf(&sdf, scale * voxel);
 }
 
 static inline vsh_grid *grid_of(truth_scene scene, double voxel) {
     const double nowhere[3] = {0.0, 0.0, 0.0};
     return grid_of_moved(scene, voxel, 1.0, nowhere);
-}
-
-/* Takes the grid. */
-static inline vsh_field *field_of_grid(vsh_grid *grid, double reach) {
-    vsh_field_options options = vsh_field_options_default();
-    options.reach = reach;
-    vsh_field *field = NULL;
-    assert_ok(vsh_field_create(grid, &options, NULL, &field, &failure));
-    vsh_grid_free(grid);
-    return field;
 }
 
 static inline vsh_field *field_of(truth_scene scene, double voxel, double reach) {

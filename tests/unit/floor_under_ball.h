@@ -3,7 +3,6 @@
 #define TEST_FLOOR_UNDER_BALL_H
 
 #include "images.h"
-#include "testing.h"
 
 typedef struct case_scene {
     char mesh[300], output[300];
@@ -17,18 +16,11 @@ typedef struct case_scene {
 /* The floor has 4 × 4 units and `size` texels a side; the ball's middle is `height` above it, its radius 0.6.
  */
 static inline void fill(case_scene *c, int32_t size, double height) {
-    static const float corners[4][3] = {{-2, 0, -2}, {2, 0, -2}, {2, 0, 2}, {-2, 0, 2}};
     memset(c, 0, sizeof *c);
     snprintf(c->mesh, sizeof c->mesh, "%s", at("floor.obj"));
     snprintf(c->output, sizeof c->output, "%s", at("floor.exr"));
-    FILE *file = fopen(c->mesh, "wb");
-    assert_non_null(file);
-    for (int i = 0; i < 4; ++i) {
-        fprintf(file, "v %g %g %g\nvt %d %d\n", (double)corners[i][0], (double)corners[i][1],
-                (double)corners[i][2], i == 1 || i == 2, i < 2);
-    }
-    fprintf(file, "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n");
-    assert_int_equal(fclose(file), 0);
+    write_string(c->mesh, "v -2 0 -2\nvt 0 1\nv 2 0 -2\nvt 1 1\nv 2 0 2\nvt 1 0\nv -2 0 2\nvt 0 0\n"
+                          "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n");
     c->scene = vsh_scene_default();
     c->receiver = vsh_receiver_default();
     c->ball = vsh_sdf_node_default();

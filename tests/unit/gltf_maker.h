@@ -3,7 +3,6 @@
 #define TESTS_GLTF_MAKER_H
 
 #include "models.h"
-#include "testing.h"
 
 enum { BYTES = 5120, UBYTES, SHORTS, USHORTS, UINTS = 5125, FLOATS };
 

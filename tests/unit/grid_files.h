@@ -26,14 +26,12 @@
 #include "levelset/access.h"
 
 // Last: it has macros named as OpenVDB's members are.
-#include "testing.h"
+#include "folder.h"
 
 using openvdb::FloatGrid;
 
-inline std::string folder;
-
 inline std::string in_folder(const char *name) {
-    return folder + "/" + name;
+    return at(name);
 }
 
 inline std::string content(const std::string &path) {
@@ -46,15 +44,10 @@ inline void put(const std::string &path, const std::string &bytes) {
 }
 
 inline void assert_said(vsh_result result, vsh_result expected, std::initializer_list<const char *> parts) {
-    if (result != expected) {
-        print_error("%d %s\n", result, result != VSH_OK ? failure.message : "");
-    }
-    assert_int_equal(result, expected);
+    assert_that(result == expected, "%d %s", result, result != VSH_OK ? failure.message : "");
     for (const char *part : parts) {
-        if (std::strstr(failure.message, part) == nullptr) {
-            print_error("'%s' is not in '%s'\n", part, failure.message);
-        }
-        assert_non_null(std::strstr(failure.message, part));
+        assert_that(std::strstr(failure.message, part) != nullptr, "'%s' is not in '%s'", part,
+                    failure.message);
     }
 }
 
@@ -79,17 +72,6 @@ inline std::string save(const char *name, const openvdb::GridPtrVec &grids) {
     return path;
 }
 
-inline vsh_grid *own_sphere() {
-    vsh_sdf_node node = vsh_sdf_node_default();
-    node.radius = RADIUS;
-    const vsh_sdf tree = {&node, 1};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = VOXEL;
-    vsh_grid *grid = nullptr;
-    assert_int_equal(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK);
-    return grid;
-}
-
 inline std::vector<vshi_leaf> leaves_of(const vsh_grid *grid) {
     std::vector<vshi_leaf> leaves(vshi_grid_leaves(grid, nullptr, 0));
     vshi_grid_leaves(grid, leaves.data(), leaves.size());
@@ -111,76 +93,10 @@ inline void assert_same(const vsh_grid *a, const vsh_grid *b) {
                 one.shell_thickness == other.shell_thickness);
 }
 
-// Largest error in voxels against a sphere at the world's `centre`, over the band.
-inline double worst_error(const vsh_grid *grid, double radius, const openvdb::Vec3d &centre) {
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    const double *m = info.transform;
-    double worst = 0.0;
-    for (const vshi_leaf &leaf : leaves_of(grid)) {
-        for (int v = 0; v < 512; ++v) {
-            const int index[3] = {leaf.origin[0] + v / 64, leaf.origin[1] + v / 8 % 8,
-                                  leaf.origin[2] + v % 8};
-            openvdb::Vec3d p;
-            for (int row = 0; row < 3; ++row) {
-                p[row] = m[4 * row] * index[0] + m[4 * row + 1] * index[1] + m[4 * row + 2] * index[2] +
-                         m[4 * row + 3];
-            }
-            const double band = info.half_width * info.voxel_size;
-            const double truth = std::fmax(-band, std::fmin(band, (p - centre).length() - radius));
-            worst = std::fmax(worst, std::fabs(double(leaf.values[v]) - truth) / info.voxel_size);
-        }
-    }
-    return worst;
-}
-
-struct Warnings {
-    std::vector<std::string> lines;
-    vsh_run run = vsh_run_default();
-    Warnings() {
-        run.user = this;
-        run.warning = [](void *user, const char *line) {
-            static_cast<Warnings *>(user)->lines.emplace_back(line);
-        };
-    }
-};
-
-inline void refused(const char *file, const openvdb::GridBase::Ptr &grid,
-                    std::initializer_list<const char *> parts) {
-    const std::string path = save(file, {grid});
-    vsh_grid *read = nullptr;
-    assert_said(vsh_grid_read(path.c_str(), nullptr, nullptr, &read, &failure), VSH_ERROR_INPUT, parts);
-    assert_non_null(std::strstr(failure.message, path.c_str()));
-    assert_null(read);
-    vsh_vdb_entry entry;
-    size_t count = 0;
-    assert_int_equal(vsh_vdb_list(path.c_str(), nullptr, &entry, 1, &count, &failure), VSH_OK);
-    for (const char *part : parts) {
-        assert_non_null(std::strstr(entry.problem, part));
-    }
-}
-
-// A sphere of 2 voxels' band, which is measured again.
-inline FloatGrid::Ptr narrow_sphere(const char *name, float radius) {
-    const FloatGrid::Ptr grid = ball<FloatGrid>(double(radius), 2.0f);
-    grid->setName(name);
-    return grid;
-}
-
-inline int remove_folder(void **) {
-    return std::system(("rm -r '" + folder + "'").c_str());
-}
-
-// A folder of the test's own, and OpenVDB ready; false where there is none.
+// A folder of the test's own, and OpenVDB ready; false if it cannot be made.
 inline bool make_folder() {
-    const char *place = std::getenv("TMPDIR");
-    folder = std::string(place != nullptr ? place : ".") + "/vdbshade-grid-file-XXXXXX";
     openvdb::initialize();
-    return mkdtemp(folder.data()) != nullptr;
-}
-
-inline int begin_folder(void **) {
-    return make_folder() ? 0 : 1;
+    return make_folder(nullptr) == 0;
 }
 
 #endif

@@ -1,8 +1,8 @@
-/* Grids against closed forms: what their tests share. */
+/* The values of grids, and closed forms that they are compared with. */
 #ifndef TESTS_GRIDS_H
 #define TESTS_GRIDS_H
 
-#include "testing.h"
+#include "handles.h"
 
 #include <stdatomic.h>
 
@@ -24,7 +24,7 @@ static inline leaves leaves_of(const vsh_grid *grid) {
     all.leaf = malloc((all.count + 1) * sizeof *all.leaf);
     assert_non_null(all.leaf);
     assert_int_equal(vshi_grid_leaves(grid, all.leaf, all.count), all.count);
-    vsh_grid_get_info(grid, &all.info);
+    all.info = grid_info(grid);
     return all;
 }
 
@@ -147,37 +147,17 @@ static inline double unit_sphere(const double p[3]) {
     return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - 1.0;
 }
 
-static vsh_sdf_node hole_nodes[3];
-
 static inline vsh_sdf hollow_sphere(void) {
-    hole_nodes[0] = vsh_sdf_node_default();
-    hole_nodes[1] = vsh_sdf_node_default();
-    hole_nodes[1].radius = 0.6;
-    hole_nodes[2] = vsh_sdf_node_default();
-    hole_nodes[2].shape = VSH_SDF_SUBTRACTION;
-    hole_nodes[2].left = 0;
-    hole_nodes[2].right = 1;
-    return (vsh_sdf){hole_nodes, 3};
+    static vsh_sdf_node nodes[3];
+    nodes[0] = nodes[1] = vsh_sdf_node_default();
+    nodes[1].radius = 0.6;
+    nodes[2] = operation_node(VSH_SDF_SUBTRACTION, 0, 1);
+    return (vsh_sdf){nodes, 3};
 }
 
 static inline double hollow_truth(const double p[3]) {
     const double d = unit_sphere(p);
     return fmax(d, -(d + 0.4));
-}
-
-typedef struct watch {
-    double last;
-    double stop; /* fraction at which to cancel */
-    int calls;
-} watch;
-
-static inline int32_t watch_progress(void *user, const char *stage, double fraction) {
-    watch *w = user;
-    assert_string_equal(stage, "voxelize");
-    assert_true(fraction >= w->last && fraction <= 1.0);
-    w->last = fraction;
-    ++w->calls;
-    return fraction >= w->stop;
 }
 
 static inline double room_with_a_ball(const double p[3]) {

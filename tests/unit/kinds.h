@@ -1,9 +1,8 @@
-/* What the components of meshes put together from parts are taken for. */
+/* Kinds of a mesh's components: solids, rooms, walls and sheets. */
 #ifndef KINDS_H
 #define KINDS_H
 
 #include "shapes.h"
-#include "testing.h"
 
 #include "mesh/solidity.h"
 
@@ -18,14 +17,12 @@ static inline vshi_solidity *solidity_of(const vsh_mesh *meshes, size_t count) {
 /* The kinds of all components in their order: "S" solid, "R" room, "W" wall, "-" sheet. */
 static inline void assert_kinds(const vsh_mesh *meshes, size_t count, const char *kinds) {
     OWNED(vshi_solidity) *s = solidity_of(meshes, count);
-    size_t all;
-    const vshi_component *c = vshi_solidity_components(s, &all);
     char found[32] = "";
-    for (size_t i = 0; i < all && i + 1 < sizeof found; ++i) {
-        found[i] = "-SRW"[c[i].kind];
+    for (size_t i = 0; i < s->count && i + 1 < sizeof found; ++i) {
+        found[i] = "-SRW"[s->components[i].kind];
     }
     assert_that(strcmp(found, kinds) == 0, "%s: %s, expected %s (encloses %g)", meshes->name, found, kinds,
-                c[0].enclosed);
+                s->components[0].enclosed);
 }
 
 static inline void assert_kinds_of(shape *s, const char *what, const char *kinds) {

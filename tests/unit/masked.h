@@ -31,7 +31,6 @@ static inline vsh_alpha_mask mask_of(const uint8_t *alpha, int32_t width, int32_
 /* A card in the plane of this height, seen from above anticlockwise: its front is up. */
 static inline card *card_at(float height) {
     card *c = malloc(sizeof *c);
-    assert_non_null(c);
     for (uint32_t k = 0; k < 4; ++k) {
         const bool right = k == 1 || k == 2, far = k >= 2;
         const float at[3] = {right ? 1.0f : -1.0f, height, far ? -1.0f : 1.0f};
@@ -67,7 +66,6 @@ typedef struct fan {
 
 static inline fan *fan_at(float height) {
     fan *f = malloc(sizeof *f);
-    assert_non_null(f);
     /* as large as the circle that the polygon stands for */
     const double radius = DISC_RADIUS * sqrt(2.0 * PI / DISC_SECTORS / sin(2.0 * PI / DISC_SECTORS));
     memcpy(f->positions, (const float[]){0.0f, height, 0.0f}, 3 * sizeof(float));
@@ -86,9 +84,9 @@ static inline fan *fan_at(float height) {
     return f;
 }
 
-static inline vsh_triangles *traced_of(const vsh_mesh *meshes, size_t count) {
-    vsh_triangles *triangles = NULL;
-    assert_ok(vsh_triangles_create(meshes, count, NULL, &triangles, &failure));
+static inline vshi_triangles *traced_of(const vsh_mesh *meshes, size_t count) {
+    vshi_triangles *triangles = NULL;
+    assert_ok(vshi_triangles_create(meshes, count, NULL, &triangles, &failure));
     return triangles;
 }
 

@@ -25,13 +25,13 @@ static inline vsh_outline *text(const char *letters, double height) {
     options.height = height;
     options.align = VSH_ALIGN_CENTER;
     vsh_outline *outline = NULL;
-    assert_ok(vsh_outline_from_text(letters, FONT, &options, NULL, &outline, &failure));
+    assert_ok(vshi_outline_from_text(letters, FONT, &options, NULL, &outline, &failure));
     return outline;
 }
 
-static inline vsh_outline_info info_of(const vsh_outline *outline) {
-    vsh_outline_info info;
-    vsh_outline_get_info(outline, &info);
+static inline vshi_outline_info info_of(const vsh_outline *outline) {
+    vshi_outline_info info;
+    vshi_outline_get_info(outline, &info);
     return info;
 }
 
@@ -48,7 +48,7 @@ static inline double truth_square(const vsh_outline *o, double x, double y) {
     double least = INFINITY;
     size_t count;
     const double *p;
-    for (size_t c = 0; (p = vsh_outline_contour(o, c, &count)) != NULL; ++c) {
+    for (size_t c = 0; (p = vshi_outline_contour(o, c, &count)) != NULL; ++c) {
         for (size_t i = 0; i < count; ++i) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
             const double dx = b[0] - a[0], dy = b[1] - a[1];
@@ -65,7 +65,7 @@ static inline bool truth_inside(const vsh_outline *o, double x, double y) {
     double angle = 0.0; /* by the sum of the angles that the segments are seen under */
     size_t count;
     const double *p;
-    for (size_t c = 0; (p = vsh_outline_contour(o, c, &count)) != NULL; ++c) {
+    for (size_t c = 0; (p = vshi_outline_contour(o, c, &count)) != NULL; ++c) {
         for (size_t i = 0; i < count; ++i) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
             const double ax = a[0] - x, ay = a[1] - y, bx = b[0] - x, by = b[1] - y;
@@ -79,7 +79,7 @@ static inline bool truth_inside(const vsh_outline *o, double x, double y) {
 static inline bool truth_hit(const vsh_outline *o, double x, double y, double dx, double dy, double far) {
     size_t count;
     const double *p;
-    for (size_t c = 0; (p = vsh_outline_contour(o, c, &count)) != NULL; ++c) {
+    for (size_t c = 0; (p = vshi_outline_contour(o, c, &count)) != NULL; ++c) {
         for (size_t i = 0; i < count; ++i) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
             const double ex = b[0] - a[0], ey = b[1] - a[1], px = a[0] - x, py = a[1] - y;

@@ -1,10 +1,10 @@
-/* Options of the preview methods, for tests of what cones do. */
+/* Options of the preview methods, for tests of cones. */
 #ifndef TESTS_PREVIEWS_H
 #define TESTS_PREVIEWS_H
 
 #include "testing.h"
 
-#include <vdbshade/render.h>
+#include <vdbshade/picture.h>
 
 /* One cone a point, sixteen for AO; 64 rays where a test then names a method by rays. */
 static inline vsh_shade_options preview_options(void) {

@@ -1,15 +1,15 @@
-// A test that is its own reader (vsh_run.reader), and one that misbehaves where it is told to.
+// A test is its own reader (vsh_run.reader), which misbehaves on request.
 #ifndef TESTS_READERS_H
 #define TESTS_READERS_H
 
-#include "grid_files.h"
-
-#include "image/planes.h"
+#include "image/image.h"
 #include "levelset/file.h"
 #include "model/model.h"
 #include "outline/outline.h"
 #include "sandbox/confine.h"
 #include "sandbox/reader.h"
+
+#include "grid_files.h"
 
 #include <algorithm>
 #include <chrono>
@@ -111,7 +111,7 @@ inline vsh_run with_reader(bool wanted = true) {
     return run;
 }
 
-// What a reader would send for a file; `request` is what follows the path in its request.
+// The answer of a reader for a file; `request` is the part of its request behind the path.
 template <typename Request>
 std::vector<unsigned char> payload_of(vshi_serve_fn *serve, const std::string &path, Request &&request) {
     static vshi_encoder encoder;
@@ -137,9 +137,10 @@ std::vector<unsigned char> payload_of(vshi_serve_fn *serve, const std::string &p
     return bytes;
 }
 
-// Calls `use(take)` for a payload that is cut, and changed in one to four places, `count` times, counted and
-// not drawn.
-template <typename Use> void damage(const std::vector<unsigned char> &whole, int count, Use &&use) {
+// Calls `refuses(decoder)` for a payload that is cut, and changed in one to four places, `count` times.
+// Returns how many are refused. The damage is the same in every run.
+template <typename Refuses>
+int damage(const std::vector<unsigned char> &whole, int count, Refuses &&refuses) {
     static const uint64_t values[] = {
         0, 1, UINT64_MAX, uint64_t(1) << 63, uint64_t(1) << 32, 0x7fc00000, 0x7ff0000000000000u};
     uint64_t state = 1;
@@ -147,8 +148,9 @@ template <typename Use> void damage(const std::vector<unsigned char> &whole, int
         state = state * 6364136223846793005u + 1442695040888963407u;
         return state >> 33;
     };
+    int refused = 0;
     for (int i = 0; i < count; ++i) {
-        // of its own size, so that a sanitizer sees what is read behind it
+        // an array of this size, so that a sanitizer sees reads behind its end
         std::vector<unsigned char> bytes(whole);
         for (uint64_t k = next() % 4 + 1; k > 0; --k) {
             // half of them near the beginning, where the counts are
@@ -157,7 +159,7 @@ template <typename Use> void damage(const std::vector<unsigned char> &whole, int
             if (next() % 2 == 0) {
                 bytes[at] ^= static_cast<unsigned char>(1u << next() % 8);
             } else {
-                const uint64_t value = values[next() % (sizeof values / sizeof values[0])];
+                const uint64_t value = values[next() % (COUNT_OF(values))];
                 const size_t aligned = at / 8 * 8;
                 std::memcpy(bytes.data() + aligned, &value, std::min<size_t>(8, bytes.size() - aligned));
             }
@@ -167,8 +169,9 @@ template <typename Use> void damage(const std::vector<unsigned char> &whole, int
             bytes.shrink_to_fit();
         }
         vshi_decoder decoder = {bytes.data(), bytes.data() + bytes.size(), false};
-        use(&decoder);
+        refused += refuses(&decoder);
     }
+    return refused;
 }
 
 #endif

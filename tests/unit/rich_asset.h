@@ -4,6 +4,13 @@
 
 #include "assets.h"
 
+static inline void assert_file(const char *name, const void *expected, size_t expected_size) {
+    size_t size;
+    FREED unsigned char *bytes = load_bytes(path_of(name).text, &size);
+    assert_int_equal(size, expected_size);
+    assert_memory_equal(bytes, expected, size);
+}
+
 enum { SIDE = 5, QUADS = (SIDE - 1) * (SIDE - 1), VERTICES = SIDE * SIDE, INDICES = 6 * QUADS };
 
 /* Interleaved positions, normals and UVs as shorts; colours of three bytes; numbers of two; joints, weights.
@@ -199,7 +206,7 @@ static inline void rich_rest(asset *a) {
                       "{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"doubleSided\":true,\"extras\":{\"wind\":1}"
                       "},{\"name\":\"rail\",\"emissiveFactor\":[0.1,0.2,0.3]}]"},
     };
-    for (size_t i = 0; i < sizeof members / sizeof members[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(members); ++i) {
         json_object_set_new(a->root, members[i][0], parsed(members[i][1]));
     }
 }

@@ -65,7 +65,7 @@ static inline vsh_stitch_report stitch(const vsh_mesh *meshes, size_t count, con
     vsh_stitch_options options = vsh_stitch_options_default();
     options.max_change = max_change;
     vsh_stitch_report report;
-    assert_ok(vsh_lightmap_stitch(charts, lightmap, lights, &options, NULL, &report, &failure));
+    assert_ok(stitch_one(charts, lightmap, lights, &options, NULL, &report, &failure));
     return report;
 }
 
@@ -77,9 +77,23 @@ static inline float *new_plane(float value) {
     return plane;
 }
 
+/* The same values whenever a seed is the same. */
 static inline float random_value(uint32_t *state) {
     *state = *state * 1664525u + 1013904223u;
     return (float)(*state >> 8) * 0x1p-24f;
+}
+
+static inline float *random_plane(uint32_t seed) {
+    float *plane = new_plane(0.0f);
+    for (size_t i = 0; i < TEXELS; ++i) {
+        plane[i] = random_value(&seed);
+    }
+    return plane;
+}
+
+static inline vsh_stitch_report stitch_ao(const charts_mesh *m, float *ao, double max_change) {
+    const vsh_lightmap map = {.ao = ao};
+    return stitch(&m->mesh, 1, &map, 0, max_change);
 }
 
 /* A bilinear lookup at a place, texels. */
@@ -131,7 +145,7 @@ static inline charts_mesh *two_squares(double degrees, double mirror) {
     return m;
 }
 
-/* What is beyond the reach of the second square and its padding is of the first. */
+/* Whether a texel is beyond the reach of the second square and its padding. */
 static inline bool is_first(size_t texel) {
     const double x = (double)(texel % SIDE) + 0.5 - SECOND[0], y = (double)(texel / SIDE) + 0.5 - SECOND[1];
     return x * x + y * y > 21.2 * 21.2;

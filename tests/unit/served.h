@@ -26,7 +26,7 @@ static inline vsh_model *read_gltf_by(bool reader, const char *json) {
     return model;
 }
 
-/* What a reader tells of a file; how many bytes that is. */
+/* Writes a reader's answer for a file. Returns its number of bytes. */
 static inline size_t payload_of(const char *name, unsigned char *bytes, size_t room) {
     static vshi_encoder encoder;
     vsh_error error = {0};

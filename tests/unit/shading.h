@@ -7,6 +7,8 @@
 #include "previews.h"
 #include "testing.h"
 
+#include "field/field.h"
+
 #define PI 3.14159265358979323846
 #define RADIANS(degrees) ((degrees)*PI / 180.0)
 
@@ -26,15 +28,29 @@ static inline vsh_light lamp(const double position[3], double radius) {
     return light;
 }
 
+static inline vsh_shade_stats shade_points(const vsh_occluders *occluders, const vsh_points *points,
+                                           const vsh_light *light, const vsh_shade_options *options,
+                                           const vsh_run *run, float *values, float *deviation) {
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    assert_ok(vsh_shade_shadow(occluders, points, light, options, run, values, deviation, &stats, &failure));
+    return stats;
+}
+
+static inline vsh_shade_stats shade_ao_points(const vsh_occluders *occluders, const vsh_points *points,
+                                              const vsh_shade_options *options, const vsh_run *run,
+                                              float *values) {
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    assert_ok(vsh_shade_ao(occluders, points, options, run, values, NULL, NULL, &stats, &failure));
+    return stats;
+}
+
 static inline vsh_shade_stats shadows_by(const vsh_occluders *occluders, const vsh_light *light,
                                          int32_t method, size_t count, const double *positions,
                                          const float *normals, float *visible) {
     vsh_shade_options options = preview_options();
     options.method = method;
     const vsh_points points = {count, positions, normals, NULL};
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    assert_ok(vsh_shade_shadow(occluders, &points, light, &options, NULL, visible, NULL, &stats, &failure));
-    return stats;
+    return shade_points(occluders, &points, light, &options, NULL, visible, NULL);
 }
 
 static inline vsh_shade_stats shadows(const vsh_field *field, const vsh_light *light, int32_t method,
@@ -48,6 +64,13 @@ static inline float shadow_at(const vsh_field *field, const vsh_light *light, in
     float visible = -1.0f;
     shadows(field, light, method, 1, position, normal, &visible);
     return visible;
+}
+
+/* A field in which nothing casts. */
+static inline vsh_field *field_of_nothing(double voxel) {
+    vsh_field *field = NULL;
+    assert_ok(vshi_field_create_empty(voxel, &field, &failure));
+    return field;
 }
 
 /* Unit direction `elevation` over the x, z plane at `azimuth`, radians. */
@@ -88,12 +111,7 @@ static inline vsh_field *hollow_box(double voxel, double wall) {
     nodes[2].shape = VSH_SDF_SUBTRACTION;
     nodes[2].left = 0;
     nodes[2].right = 1;
-    const vsh_sdf sdf = {nodes, 3};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = voxel;
-    vsh_grid *grid = NULL;
-    assert_int_equal(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, NULL), VSH_OK);
-    return field_of_grid(grid, 0.0);
+    return field_of_grid(grid_of_tree(nodes, 3, with_voxel(voxel)), 0.0);
 }
 
 #endif

@@ -24,7 +24,6 @@ static inline float hill(int i, int j, int n) {
 
 static inline float *hills(int columns, int rows) {
     float *values = malloc((size_t)columns * (size_t)rows * sizeof *values);
-    assert_non_null(values);
     for (int i = 0; i < rows; ++i) {
         for (int j = 0; j < columns; ++j) {
             values[i * columns + j] = hill(i, j, columns);
@@ -49,9 +48,9 @@ static inline vsh_model *model_of(const vsh_heights_source *source, int32_t what
     return model;
 }
 
-static inline vsh_heights *heights_of(const vsh_heights_source *source) {
-    vsh_heights *heights = NULL;
-    assert_ok(vsh_heights_create(source, NULL, &heights, &failure));
+static inline vshi_heights *heights_of(const vsh_heights_source *source) {
+    vshi_heights *heights = NULL;
+    assert_ok(vshi_heights_create(source, NULL, &heights, &failure));
     return heights;
 }
 

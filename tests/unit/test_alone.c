@@ -1,7 +1,6 @@
-/* What a point gets does not depend on the other points of a call, by no bit. */
-#include "previews.h"
-#include "shading.h"
-#include "testing.h"
+/* Points of one call: no bit of a value depends on the other points. Neighbours share proofs, which saves
+ * samples and proves nothing wrong. */
+#include "traced.h"
 
 enum { SIDE = 448, MANY = SIDE * SIDE, SOME = 1 << 14, SOLIDS = 14 };
 
@@ -69,19 +68,17 @@ static void compare(const vsh_field *field, const vsh_light *light, const vsh_sh
     assert_ok(vsh_query_create(occluders_of(field), light, light != NULL, options, &query, &failure));
     ask(query, light == NULL, count, count, among);
     const size_t batches[] = {1, 1000};
-    for (size_t b = 0; b < sizeof batches / sizeof batches[0]; ++b) {
+    for (size_t b = 0; b < COUNT_OF(batches); ++b) {
         ask(query, light == NULL, count, batches[b], alone);
         size_t different = 0, most = 0;
         for (size_t i = 0; i < count; ++i) {
             different += bits_of(alone[i]) != bits_of(among[i]);
             most = fabsf(alone[i] - among[i]) > fabsf(alone[most] - among[most]) ? i : most;
         }
-        if (different > 0) {
-            fail_msg("%s: %zu values of %zu differ in calls for %zu, point %zu by %g",
-                     light != NULL ? vsh_get_name(VSH_NAMES_SHADOW, options->method)
-                                   : vsh_get_name(VSH_NAMES_AO, options->ao_method),
-                     different, count, batches[b], most, (double)fabsf(alone[most] - among[most]));
-        }
+        assert_that(different == 0, "%s: %zu values of %zu differ in calls for %zu, point %zu by %g",
+                    light != NULL ? vsh_get_name(VSH_NAMES_SHADOW, options->method)
+                                  : vsh_get_name(VSH_NAMES_AO, options->ao_method),
+                    different, count, batches[b], most, (double)fabsf(alone[most] - among[most]));
     }
 }
 
@@ -103,7 +100,7 @@ TEST(a_sun_that_the_horizon_cuts_is_as_bright_for_one_point_as_for_many) {
     compare_shadows(field, &light, VSH_SHADOW_HARD, VSH_SHADOW_CONE);
 }
 
-/* Deep in an umbra, where a march may miss the deepest place of what hides the sun. */
+/* Deep in an umbra, a march may miss the deepest place of the wall. */
 TEST(a_sun_behind_walls_is_as_dark_for_one_point_as_for_many) {
     static truth_solid walls[] = {
         {.shape = TRUTH_BOX, .center = {0.0, -0.1, 0.0}, .half = {2.5, 0.1, 2.5}},
@@ -137,7 +134,7 @@ TEST(lamps_among_solids_are_as_bright_for_one_point_as_for_many) {
         {34, 0.04, {0.89122105210774416, 1.1567599392902033, 0.509279919720103}, 0.5736579392094896, false},
         {27, 0.04, {1.1623453706828704, 0.54178089647683247, -1.8226544497300869}, 0.44643929618643236, true},
     };
-    for (size_t i = 0; i < sizeof CASES / sizeof CASES[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(CASES); ++i) {
         uint64_t counter = CASES[i].scene;
         const bool walls = CASES[i].scene % 2 == 1;
         OWNED(vsh_field) *field = field_of(crowd(&counter, walls), CASES[i].voxel, 0.0);
@@ -148,7 +145,7 @@ TEST(lamps_among_solids_are_as_bright_for_one_point_as_for_many) {
     }
 }
 
-TEST(ao_and_steps_of_chance_are_those_of_the_point) {
+TEST(ao_and_jittered_steps_are_those_of_the_point) {
     uint64_t counter = 5;
     OWNED(vsh_field) *field = field_of(crowd(&counter, false), 0.05, 0.0);
     place_points(true);
@@ -166,4 +163,103 @@ TEST(ao_and_steps_of_chance_are_those_of_the_point) {
     const double high[3] = {0.4, 0.8, 0.3};
     const vsh_light light = sun(high, RADIANS(10.0));
     compare(field, &light, &options, SOME);
+}
+
+/* --- proofs that neighbours share */
+
+enum { EDGE = 128, POINTS = EDGE * EDGE };
+
+static double scattered[3 * POINTS];
+static float deviation[POINTS];
+
+/* Where point i of the order of blocks is among the scattered ones. */
+static size_t place_of(size_t i) {
+    return i * 7919 % POINTS;
+}
+
+/* The seeds' floor: `positions` in the order of Morton's curve, `scattered` in one without neighbours. */
+static casting seeds_in_blocks(vsh_light lights[4]) {
+    const double place[3] = {0.9, 2.4, -0.8}, low[3] = {-0.9, 0.35, 0.2};
+    memset(normals, 0, sizeof normals);
+    for (size_t i = 0; i < POINTS; ++i) {
+        size_t x = 0, y = 0;
+        for (size_t bit = 0; bit < 7; ++bit) {
+            x |= (i >> (2 * bit) & 1) << bit;
+            y |= (i >> (2 * bit + 1) & 1) << bit;
+        }
+        const double p[3] = {-2.5 + 5.0 * ((double)x + 0.5) / EDGE, 0.001,
+                             -2.5 + 5.0 * ((double)y + 0.5) / EDGE};
+        memcpy(positions + 3 * i, p, sizeof p);
+        memcpy(scattered + 3 * place_of(i), p, sizeof p);
+        normals[3 * i + 1] = 1.0f;
+    }
+    lights[0] = sun(truth_seeds_sun, 2.0 * atan(0.05));
+    lights[1] = lamp(place, 0.1);
+    lights[2] = sun(low, RADIANS(2.0));
+    lights[3] = lamp(place, 0.6);
+    return caster_of(truth_seeds(), 0.02, 0.0);
+}
+
+static vsh_shade_stats shade(const casting *made, const vsh_light *light, int32_t method,
+                             const double *places, float *values) {
+    vsh_shade_options options = preview_options();
+    options.method = method;
+    options.rays = 8;
+    options.max_error = 1.0; /* only proved points have no error left */
+    const vsh_points points = {POINTS, places, normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    assert_ok(vsh_shade_shadow(occluders_of_caster(made), &points, light, &options, NULL, values, deviation,
+                               &stats, &failure));
+    return stats;
+}
+
+TEST(blocks_save_samples_and_change_no_value) {
+    vsh_light lights[4];
+    FREED_BY(caster_free) casting made = seeds_in_blocks(lights);
+    for (int l = 0; l < 4; ++l) {
+        for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
+            const vsh_shade_stats few = shade(&made, &lights[l], method, positions, among);
+            const vsh_shade_stats many = shade(&made, &lights[l], method, scattered, alone);
+            assert_less((double)few.samples, 0.85 * (double)many.samples);
+            for (size_t i = 0; i < POINTS; ++i) {
+                assert_true(among[i] == alone[place_of(i)]);
+            }
+        }
+    }
+}
+
+TEST(no_block_is_proved_wrong) {
+    vsh_light lights[4];
+    FREED_BY(caster_free) casting made = seeds_in_blocks(lights);
+    const double up[3] = {0.0, 1.0, 0.0};
+    float *const truth = alone;
+    for (int l = 0; l < 4; ++l) {
+        const vsh_light *light = &lights[l];
+        for (size_t i = 0; i < POINTS; ++i) {
+            double towards[3], square = 0.0;
+            for (int k = 0; k < 3; ++k) {
+                towards[k] = light->position[k] - positions[3 * i + (size_t)k];
+                square += towards[k] * towards[k];
+            }
+            const bool far = light->type == VSH_LIGHT_DIRECTIONAL;
+            const double w =
+                far ? tan(0.5 * light->angle) : light->radius / sqrt(square - light->radius * light->radius);
+            truth[i] =
+                (float)truth_light(truth_seeds(), positions + 3 * i, up, far ? light->direction : towards, w,
+                                   far ? (double)INFINITY : sqrt(square) - light->radius, 64);
+        }
+        for (int32_t method = VSH_SHADOW_ADAPTIVE; method < SHADOW_METHODS; ++method) {
+            shade(&made, light, method, positions, among);
+            size_t proved = 0, decided = 0;
+            for (size_t i = 0; i < POINTS; ++i) {
+                const double above[3] = {positions[3 * i], 0.04, positions[3 * i + 2]};
+                if (truth_distance(truth_seeds(), above) > 0.03) { /* outside the solids on the floor */
+                    decided += truth[i] == 0.0f || truth[i] == 1.0f;
+                    proved += deviation[i] == 0.0f;
+                    assert_true(deviation[i] > 0.0f || among[i] == truth[i]);
+                }
+            }
+            assert_true((double)proved > 0.7 * (double)decided);
+        }
+    }
 }

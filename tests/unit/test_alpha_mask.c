@@ -1,14 +1,14 @@
-/* Meshes that a texture cuts out: what rays meet of them, what is known of holes over a triangle, and the
- * pieces that voxels are made of. */
+/* Meshes that a texture cuts out: rays against them, the cover of a triangle, and the pieces that voxels are
+ * made of. */
 #include "masked.h"
-#include "testing.h"
 
 #include "mesh/alpha_mask.h"
 #include "trace/embree.h"
+#include "truth/metrics.h"
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
-static bool blocked(const vsh_triangles *triangles, const double from[3], const double direction[3]) {
+static bool blocked(const vshi_triangles *triangles, const double from[3], const double direction[3]) {
     vshi_segment_ray ray = {.far = INFINITY};
     memcpy(ray.origin, from, sizeof ray.origin);
     memcpy(ray.direction, direction, sizeof ray.direction);
@@ -25,9 +25,9 @@ TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
     FREED fan *f = fan_at(0.7f);
     vsh_mesh whole = c->mesh;
     whole.mask = NULL;
-    OWNED(vsh_triangles) *cut = traced_of(&c->mesh, 1);
-    OWNED(vsh_triangles) *disc = traced_of(&f->mesh, 1);
-    OWNED(vsh_triangles) *square = traced_of(&whole, 1);
+    OWNED(vshi_triangles) *cut = triangles_from(&c->mesh, 1);
+    OWNED(vshi_triangles) *disc = triangles_from(&f->mesh, 1);
+    OWNED(vshi_triangles) *square = triangles_from(&whole, 1);
     double positions[3 * POINTS];
     float normals[3 * POINTS], value[3][POINTS];
     for (size_t i = 0; i < POINTS; ++i) {
@@ -37,22 +37,17 @@ TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
     }
     const double towards[3] = {0.3, 1.0, 0.1};
     const vsh_light light = sun(towards, 0.4);
-    const vsh_triangles *all[3] = {cut, disc, square};
+    const vshi_triangles *all[3] = {cut, disc, square};
     for (int ao = 0; ao < 2; ++ao) {
         for (int k = 0; k < 3; ++k) {
-            const vsh_result result = ao ? vsh_trace_ao(all[k], NULL, POINTS, positions, normals, 0.0, 3.0,
-                                                        RAYS, NULL, value[k], NULL)
-                                         : vsh_trace_shadow(all[k], NULL, POINTS, positions, normals, 0.0,
-                                                            &light, RAYS, NULL, value[k], NULL);
-            assert_ok(result);
+            assert_ok(ao ? vshi_trace_ao(all[k], NULL, POINTS, positions, normals, 0.0, 3.0, RAYS, NULL,
+                                         value[k], NULL)
+                         : vshi_trace_shadow(all[k], NULL, POINTS, positions, normals, 0.0, &light, RAYS,
+                                             NULL, value[k], NULL));
         }
-        double worst = 0.0, other = 0.0;
-        for (size_t i = 0; i < POINTS; ++i) {
-            worst = fmax(worst, fabs((double)value[0][i] - (double)value[1][i]));
-            other = fmax(other, fabs((double)value[0][i] - (double)value[2][i]));
-        }
-        assert_true(worst <= 3.0 / RAYS); /* rays on the very edge */
-        assert_true(other > 0.05);
+        assert_at_most(truth_compare(POINTS, value[0], value[1], NULL).max,
+                       3.0 / RAYS); /* rays on the very edge */
+        assert_true(truth_compare(POINTS, value[0], value[2], NULL).max > 0.05);
     }
 }
 
@@ -68,7 +63,7 @@ TEST(rays_see_wraps_transforms_cutoff_and_base_factor) {
         for (size_t k = 0; k < 8; ++k) {
             c->uvs[k] = 5.0f * c->uvs[k] - 2.25f; /* u: x from -1 to 1 is -2.25 to 2.75 */
         }
-        OWNED(vsh_triangles) *triangles = traced_of(&c->mesh, 1);
+        OWNED(vshi_triangles) *triangles = triangles_from(&c->mesh, 1);
         for (int k = 0; k < 400; ++k) {
             const double x = 1.9 * next_of(&seed) - 0.95, z = 1.9 * next_of(&seed) - 0.95;
             const double u = 2.5 * (x + 1.0) - 2.25, v = 2.5 * (1.0 - z) - 2.25;
@@ -92,7 +87,7 @@ TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
     for (size_t k = 0; k < 8; ++k) {
         c->uvs[k] *= 37.0f; /* many small discs */
     }
-    OWNED(vsh_triangles) *triangles = traced_of(&c->mesh, 1);
+    OWNED(vshi_triangles) *triangles = triangles_from(&c->mesh, 1);
     static vshi_segment_ray rays[RAYS];
     static bool together[RAYS], turned[RAYS];
     uint32_t seed = 3;
@@ -119,7 +114,7 @@ TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
     }
 }
 
-/* --- what else is made of triangles */
+/* --- solids and one-sided faces */
 
 static const double BOX_LOW[3] = {-1, -1, -1}, BOX_HIGH[3] = {1, 1, 1};
 
@@ -133,7 +128,7 @@ TEST(a_masked_box_holds_nothing) {
         box.mask = masked ? &mask : NULL;
         box.mask_uvs = uvs;
         box.solidity = masked ? VSH_SOLIDITY_SOLID : VSH_SOLIDITY_AUTO;
-        OWNED(vsh_triangles) *triangles = traced_of(&box, 1);
+        OWNED(vshi_triangles) *triangles = triangles_from(&box, 1);
         assert_int_equal(vshi_triangles_have_solids(triangles), !masked);
     }
 }
@@ -142,7 +137,7 @@ TEST(a_one_sided_box_is_as_solid_as_any) {
     float corners[24];
     vsh_mesh box = box_mesh(corners, BOX_LOW, BOX_HIGH);
     box.one_sided = 1;
-    OWNED(vsh_triangles) *triangles = traced_of(&box, 1);
+    OWNED(vshi_triangles) *triangles = triangles_from(&box, 1);
     assert_true(vshi_triangles_have_solids(triangles));
     for (int i = 0; i < 3; ++i) {
         const vshi_segment_ray ray = {{-3.0 + 3.0 * i, 0.1, 0.2}, {1.0, 0.0, 0.0}, INFINITY};
@@ -165,7 +160,7 @@ TEST(light_on_the_back_of_a_one_sided_face_comes_through) {
         mesh.one_sided = one_sided;
         mesh.transform = transform;
         mesh.mask = masked ? mesh.mask : NULL;
-        OWNED(vsh_triangles) *triangles = traced_of(&mesh, 1);
+        OWNED(vshi_triangles) *triangles = triangles_from(&mesh, 1);
         const double under[3] = {0.1, 0.0, 0.2}, over[3] = {0.1, 2.0, 0.2};
         /* its front is up: a light above shines on it */
         assert_true(blocked(triangles, under, (const double[]){0, 1, 0}));
@@ -177,7 +172,7 @@ TEST(light_on_the_back_of_a_one_sided_face_comes_through) {
 
 /* --- what is refused */
 
-TEST(masks_that_are_none_are_refused) {
+TEST(bad_masks_are_refused) {
     FREED card *c = card_at(0.0f);
     vsh_alpha_mask bad[8];
     for (int i = 0; i < 8; ++i) {
@@ -193,8 +188,8 @@ TEST(masks_that_are_none_are_refused) {
     for (int i = 0; i < 8; ++i) {
         c->mesh.mask = &bad[i];
         c->mesh.mask_uvs = i < 7 ? c->uvs : NULL;
-        vsh_triangles *triangles = NULL;
-        assert_fails(vsh_triangles_create(&c->mesh, 1, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT,
+        vshi_triangles *triangles = NULL;
+        assert_fails(vshi_triangles_create(&c->mesh, 1, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT,
                      "'card'");
         assert_null(triangles);
     }
@@ -202,9 +197,9 @@ TEST(masks_that_are_none_are_refused) {
 
 /* --- holes and pieces */
 
-TEST(what_is_said_of_a_triangle_holds_all_over_it) {
+TEST(the_cover_of_a_triangle_holds_all_over_it) {
     uint32_t seed = 7;
-    int told[3] = {0};
+    int counts[3] = {0};
     for (int i = 0; i < 18 * 40; ++i) {
         uint8_t alpha[WIDE * HIGH];
         vsh_alpha_mask mask = random_mask(alpha, i % 18, &seed);
@@ -225,7 +220,7 @@ TEST(what_is_said_of_a_triangle_holds_all_over_it) {
                 places[v] = vshi_alpha_mask_place(&mask, uvs[v]);
             }
             const vshi_mask_cover cover = vshi_mask_table_cover(&table, places);
-            ++told[cover];
+            ++counts[cover];
             for (int s = 0; s < 40 && cover != VSHI_MASK_MIXED; ++s) {
                 double a = next_of(&seed), b = next_of(&seed);
                 a = a + b > 1.0 ? 1.0 - a : a;
@@ -238,16 +233,17 @@ TEST(what_is_said_of_a_triangle_holds_all_over_it) {
             }
         }
     }
-    assert_true(told[VSHI_MASK_CLEAR] > 200 && told[VSHI_MASK_OPAQUE] > 200 && told[VSHI_MASK_MIXED] > 1000);
+    assert_true(counts[VSHI_MASK_CLEAR] > 200 && counts[VSHI_MASK_OPAQUE] > 200 &&
+                counts[VSHI_MASK_MIXED] > 1000);
 }
 
-TEST(what_lies_beyond_numbers_is_opaque) {
+TEST(places_that_are_not_finite_are_opaque) {
     const uint8_t clear[1] = {0};
     const float values[] = {NAN, INFINITY, -INFINITY, 3e38f, -3e38f, 1e20f};
     for (int wrapped = VSH_WRAP_REPEAT; wrapped <= VSH_WRAP_CLAMP; ++wrapped) {
         vsh_alpha_mask mask = mask_of(clear, 1, 1);
         mask.wrap[0] = mask.wrap[1] = wrapped;
-        for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
+        for (size_t i = 0; i < COUNT_OF(values); ++i) {
             const vshi_mask_place at = vshi_alpha_mask_place(&mask, (const float[]){values[i], values[i]});
             assert_int_equal(vshi_alpha_mask_opaque(&mask, at), !isfinite(values[i]));
             const vshi_mask_place corners[3] = {at, {0.0, 0.0}, {1.0, 0.0}};
@@ -294,23 +290,12 @@ TEST(voxels_hold_the_disc_and_not_the_card) {
     FREED card *c = card_at(0.0f);
     FREED fan *f = fan_at(0.0f);
     const double voxel = 0.05;
-    vsh_occluders *made[2];
-    vsh_occluders_options options = vsh_occluders_options_default();
-    options.triangles = 0;
-    options.grid.voxel_size = voxel;
-    for (int i = 0; i < 2; ++i) {
-        assert_ok(vsh_occluders_create(i == 0 ? &c->mesh : &f->mesh, 1, &options, NULL, &made[i], &failure));
-    }
-    vsh_occluder_parts cut, disc;
-    vsh_occluders_get_parts(made[0], &cut);
-    vsh_occluders_get_parts(made[1], &disc);
+    OWNED(vsh_field) *cut = field_of_grid(grid_from_meshes(&c->mesh, 1, voxel), 0.0);
+    OWNED(vsh_field) *disc = field_of_grid(grid_from_meshes(&f->mesh, 1, voxel), 0.0);
     int inside = 0, between = 0;
     for (int i = 0; i < 61 * 61; ++i) {
         const double at[3] = {-1.2 + 0.04 * (i % 61), 0.01, -1.2 + 0.04 * (i / 61)};
-        float distances[2];
-        vsh_field_sample(cut.field, 1, at, &distances[0]);
-        vsh_field_sample(disc.field, 1, at, &distances[1]);
-        const double a = (double)distances[0], b = (double)distances[1];
+        const double a = (double)distance_at(cut, at), b = (double)distance_at(disc, at);
         if (fabs(b) < voxel) {
             assert_true(fabs(a - b) < voxel);
             inside += b < 0.0;
@@ -323,6 +308,4 @@ TEST(voxels_hold_the_disc_and_not_the_card) {
         }
     }
     assert_true(inside > 50 && between > 100);
-    vsh_occluders_free(made[0]);
-    vsh_occluders_free(made[1]);
 }

@@ -1,5 +1,4 @@
 /* Compares AO by rays that a lightmap's texels share with AO by rays that each texel shoots alone. */
-#include "testing.h"
 #include "texels_of.h"
 #include "traced.h"
 
@@ -22,31 +21,34 @@ typedef struct stage {
     casting casters;
 } stage;
 
-static void set_vertex(quad *q, size_t v, double x, double y, double z, double s, double t) {
-    q->positions[3 * v] = (float)x;
-    q->positions[3 * v + 1] = (float)y;
-    q->positions[3 * v + 2] = (float)z;
-    q->uvs[2 * v] = (float)s;
-    q->uvs[2 * v + 1] = (float)t;
+/* A place or a UV that is linear in a quad's own u and v. */
+typedef struct linear {
+    double at, u, v;
+} linear;
+
+static void set_quad(quad *q, linear x, linear y, linear z, linear s, linear t) {
+    make_quad(q, 0.0f, 0.0f, 1.0f, 1.0f);
+    for (size_t i = 0; i < 4; ++i) {
+        const double u = i == 1 || i == 2 ? 1.0 : 0.0, v = i >= 2 ? 1.0 : 0.0;
+        q->positions[3 * i] = (float)(x.at + x.u * u + x.v * v);
+        q->positions[3 * i + 1] = (float)(y.at + y.u * u + y.v * v);
+        q->positions[3 * i + 2] = (float)(z.at + z.u * u + z.v * v);
+        q->uvs[2 * i] = (float)(s.at + s.u * u + s.v * v);
+        q->uvs[2 * i + 1] = (float)(t.at + t.u * u + t.v * v);
+    }
 }
 
 static int set_up(void **state) {
     stage *s = calloc(1, sizeof *s);
     assert_non_null(s);
     *state = s;
-    make_quad(&s->floor, 0.0f, 0.0f, 1.0f, 1.0f);
-    make_quad(&s->wall, 0.0f, 0.0f, 1.0f, 1.0f);
-    make_quad(&s->patch, 0.0f, 0.0f, 1.0f, 1.0f);
-    for (size_t v = 0; v < 4; ++v) {
-        const double x = v == 1 || v == 2 ? 1.0 : 0.0, y = v >= 2 ? 1.0 : 0.0;
-        set_vertex(&s->floor, v, 2.0 * x - 1.0, 0.0, 1.0 - 2.0 * y, 0.08 + 0.58 * x - 0.06 * y,
-                   0.02 + 0.07 * x + 0.75 * y);
-        set_vertex(&s->wall, v, -0.8 + 1.2 * x, 0.01 + 0.58 * y, -0.459, 0.02 + 0.58 * x - 0.001 * y,
-                   0.79 + 0.07 * x + 0.135 * y);
-        /* it crosses the edges of tiles */
-        set_vertex(&s->patch, v, 1.05 + 0.4 * x, 0.0, 0.5 - 0.5 * y, 0.7 + 0.28 * x,
-                   1.0 - (128.6 - 65.4 * y) / HEIGHT);
-    }
+    set_quad(&s->floor, (linear){-1, 2, 0}, (linear){0, 0, 0}, (linear){1, 0, -2},
+             (linear){0.08, 0.58, -0.06}, (linear){0.02, 0.07, 0.75});
+    set_quad(&s->wall, (linear){-0.8, 1.2, 0}, (linear){0.01, 0, 0.58}, (linear){-0.459, 0, 0},
+             (linear){0.02, 0.58, -0.001}, (linear){0.79, 0.07, 0.135});
+    /* it crosses the edges of tiles */
+    set_quad(&s->patch, (linear){1.05, 0.4, 0}, (linear){0, 0, 0}, (linear){0.5, 0, -0.5},
+             (linear){0.7, 0.28, 0}, (linear){1.0 - 128.6 / HEIGHT, 0, 65.4 / HEIGHT});
     make_sphere(&s->ball, 16, 0.205);
     for (size_t v = 0; v < s->ball.mesh.vertex_count; ++v) {
         for (size_t axis = 0; axis < 3; ++axis) {
@@ -59,7 +61,7 @@ static int set_up(void **state) {
     s->receivers[1] = s->wall.mesh;
     s->receivers[2] = s->ball.mesh;
     s->receivers[3] = s->patch.mesh;
-    s->casters = caster_of((truth_scene){SOLIDS, sizeof SOLIDS / sizeof SOLIDS[0]}, 0.02, 4.0);
+    s->casters = caster_of((truth_scene){SOLIDS, COUNT_OF(SOLIDS)}, 0.02, 4.0);
     return 0;
 }
 
@@ -95,7 +97,7 @@ static baked *bake(const stage *s, how h) {
     assert_non_null(b);
     memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
     OWNED(vsh_charts) *charts =
-        create(s->receivers, h.receivers == 0 ? RECEIVERS : h.receivers, options, NULL);
+        charts_from(s->receivers, h.receivers == 0 ? RECEIVERS : h.receivers, &options);
     const vsh_lightmap lightmap = {
         .ao = b->ao, .ao_error = b->error, .bent = b->bent, .coverage = b->coverage};
     vsh_bake_stats stats = vsh_bake_stats_zero();
@@ -139,9 +141,8 @@ static judged judge(const baked *b, const baked *truth) {
                     sum.bias / n,     sqrt(sum.angle / light), sum.count};
 }
 
-/* What a window's plane does not follow is in no deviation: here, where a texel is a twentieth of the AO
- * distance, errors are up to twice what is said of them; with texels a third as large, up to 1.5 times.
- */
+/* Deviations leave out how AO bends within a window. Here a texel is a twentieth of the AO distance, and
+ * errors are up to twice the reported ones; with texels a third as large, up to 1.5 times. */
 TEST(errors_are_below_those_asked_for_with_few_rays) {
     static const double errors[] = {0.05, 0.02, 0.01}, angles[] = {2.6, 1.8, 1.35};
     /* with 8 rays at first, whatever the error, RMSE is 0.0103 at 0.02 and 0.0068 at 0.01 */
@@ -171,8 +172,6 @@ TEST(marched_rays_are_shared_too) {
                 *shared = bake(*state, (how){.spacing = 4, .max_error = 0.02, .marched = true}),
                 *alone = bake(*state, (how){.spacing = 1, .max_error = 0.02, .marched = true});
     const judged j = judge(shared, truth), a = judge(alone, truth);
-    print_message("RMSE %.5f, said %.5f, most %.3f, %.0f rays; alone %.5f, %.0f rays\n", j.is, j.said, j.most,
-                  (double)shared->stats.rays, a.is, (double)alone->stats.rays);
     assert_true(j.is < a.is && j.most < 0.3);
     assert_true(j.is < 1.1 * sqrt(shared->stats.ao_square_error / (double)j.count));
     assert_true(shared->stats.rays * 2 < alone->stats.rays);
@@ -224,12 +223,9 @@ TEST(an_open_plate_is_exactly_1_and_has_no_seams) {
     enum { EDGE = 12 };
     const truth_solid plate = {.shape = TRUTH_BOX, .half = {1.5, 0.25, 1.5}, .center = {0.0, -0.25, 0.0}};
     stage s = *(stage *)*state;
-    for (size_t v = 0; v < 4; ++v) {
-        const double x = v == 1 || v == 2 ? 1.0 : 0.0, y = v >= 2 ? 1.0 : 0.0;
-        set_vertex(&s.floor, v, 2.0 * x - 1.0, 0.0, 1.0 - 2.0 * y, x, y);
-    }
-    s.receivers[0].positions = s.floor.positions;
-    s.receivers[0].uvs = s.floor.uvs;
+    set_quad(&s.floor, (linear){-1, 2, 0}, (linear){0, 0, 0}, (linear){1, 0, -2}, (linear){0, 1, 0},
+             (linear){0, 0, 1});
+    s.receivers[0] = s.floor.mesh;
     s.casters = caster_of((truth_scene){&plate, 1}, 0.04, 4.0);
     FREED baked *b = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1});
     float least = 1.0f, most = 0.0f;
@@ -251,12 +247,9 @@ TEST(an_open_plate_is_exactly_1_and_has_no_seams) {
 /* A piece of floor by the post and the ball, 400 texels to the AO distance. */
 TEST(fine_texels_take_few_rays) {
     stage s = *(stage *)*state;
-    for (size_t v = 0; v < 4; ++v) {
-        const double x = v == 1 || v == 2 ? 1.0 : 0.0, y = v >= 2 ? 1.0 : 0.0;
-        set_vertex(&s.floor, v, -0.5 + 0.2 * x, 0.0, 0.7 - 0.42 * y, x, y);
-    }
-    s.receivers[0].positions = s.floor.positions;
-    s.receivers[0].uvs = s.floor.uvs;
+    set_quad(&s.floor, (linear){-0.5, 0.2, 0}, (linear){0, 0, 0}, (linear){0.7, 0, -0.42}, (linear){0, 1, 0},
+             (linear){0, 0, 1});
+    s.receivers[0] = s.floor.mesh;
     FREED baked *few = bake(&s, (how){.spacing = 4, .max_error = 0.02, .receivers = 1}),
                 *truth = bake(&s, (how){.spacing = 1, .max_error = 0.005, .receivers = 1});
     const judged j = judge(few, truth);
@@ -275,24 +268,20 @@ static void bake_board(int32_t rows, int32_t spacing, double max_error, float *a
     float corners[24];
     const double low[3] = {-0.5, 3.0 * (1.0 - (double)rows / SIDE), 0.0004}, high[3] = {2.5, 3.5, 0.05};
     const vsh_mesh meshes[2] = {floor.mesh, box_mesh(corners, low, high)};
-    OWNED(vsh_triangles) *triangles = NULL;
-    OWNED(vsh_occluders) *occluders = NULL;
-    assert_ok(vsh_triangles_create(meshes, 2, NULL, &triangles, &failure));
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
-    parts.triangles = triangles;
-    assert_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
+    OWNED(vshi_triangles) *triangles = triangles_from(meshes, 2);
+    OWNED(vsh_occluders) *occluders = occluders_from_triangles(triangles);
     vsh_lightmap_options options = size_of(SIDE, SIDE, 1);
     options.ao_spacing = spacing;
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 1.0;
     options.shade.max_error = max_error;
-    OWNED(vsh_charts) *charts = create(&floor.mesh, 1, options, NULL);
+    OWNED(vsh_charts) *charts = charts_from(&floor.mesh, 1, &options);
     const vsh_lightmap lightmap = {.ao = ao};
     assert_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &lightmap, NULL, &failure));
 }
 
-/* Texels between a lattice's last ones in a square and the next square are told by one side alone. */
-TEST(what_ends_beside_a_square_darkens_no_texel_of_the_next_row) {
+/* Texels between the last ones of a square's lattice and the next square are known from one side alone. */
+TEST(an_edge_beside_a_square_darkens_no_texel_of_the_next_row) {
     enum { SIDE = 256 };
     static float ao[SIDE * SIDE], exact[SIDE * SIDE];
     for (int32_t rows = 125; rows <= 130; ++rows) {

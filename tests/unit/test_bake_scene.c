@@ -1,6 +1,5 @@
-/* A scene's lightmaps, from its files to its rows. */
+/* Lightmaps of a scene by one call, from its files to its rows. */
 #include "floor_under_ball.h"
-#include "testing.h"
 
 /* Rows come 64 at a time. */
 enum { SIZE = 384, LIMIT = 4 << 20 };
@@ -51,7 +50,7 @@ static vsh_result bake_into(const case_scene *c, const char *scratch, const vsh_
     return vsh_bake_scene(&c->scene, &options, run, NULL, error);
 }
 
-TEST(rows_of_a_callback_are_those_of_the_file) {
+TEST(rows_of_a_callback_are_those_of_the_file_within_any_memory_limit) {
     static const char *const names[] = {"shadow.sun",   "ao",           "irradiance.R",
                                         "irradiance.G", "irradiance.B", "A"};
     case_scene c;
@@ -63,21 +62,17 @@ TEST(rows_of_a_callback_are_those_of_the_file) {
     assert_int_equal(report.lightmap_count, 1);
     assert_ptr_equal(report.errors, errors);
     assert_true(report.occluders.active_voxels > 0 && report.shade.marches > 0);
-    FREED_BY(free_received) received t = {.fail_at = 0};
-    assert_ok(bake_into(&c, NULL, NULL, &t, &failure));
+    FREED_BY(free_received) received t = {.fail_at = 0}, none = {.fail_at = 0};
+    const vsh_run run = run_within(LIMIT); /* planes lie in a file of the folder `scratch` */
+    assert_ok(bake_into(&c, at("."), &run, &t, &failure));
+    assert_fails(bake_into(&c, at("missing"), &run, &none, &failure), VSH_ERROR_WRITE, "");
     assert_int_equal(t.rows, SIZE);
     assert_int_equal(t.channels, 6);
-    OWNED(vsh_image_file) *file = NULL;
-    assert_ok(vsh_image_read(c.output, NULL, &file, &failure));
+    OWNED(vsh_image_file) *file = image_from(c.output);
     const vsh_image image = vsh_image_view(file);
     for (int32_t k = 0; k < t.channels; ++k) {
         assert_string_equal(t.names[k], names[k]);
-        int32_t same = 0;
-        while (same < image.channel_count && strcmp(image.names[same], names[k]) != 0) {
-            ++same;
-        }
-        assert_true(same < image.channel_count);
-        assert_memory_equal(image.planes[same], t.values + (size_t)k * SIZE * SIZE,
+        assert_memory_equal(plane_of(&image, names[k]), t.values + (size_t)k * SIZE * SIZE,
                             SIZE * SIZE * sizeof(float));
     }
     size_t count, told = 0;
@@ -88,45 +83,11 @@ TEST(rows_of_a_callback_are_those_of_the_file) {
     assert_int_equal(told, 1);
 }
 
-/* The ball stands in the floor, so that some texels are invalid, over several tiles. */
-TEST(threads_and_memory_limits_change_no_bit) {
-    static const struct {
-        int32_t method, ao_method, supersample;
-    } cases[] = {{VSH_SHADOW_CONE, VSH_AO_CONES, 1},
-                 {VSH_SHADOW_IMPROVED, VSH_AO_TAPS, 2},
-                 {VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE, 1}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        case_scene c;
-        fill(&c, SIZE, 0.4);
-        c.receiver.supersample = cases[i].supersample;
-        c.receiver.ao_spacing = 4;
-        c.scene.shade.method = cases[i].method;
-        c.scene.shade.ao_method = cases[i].ao_method;
-        c.scene.shade.rays = 32;
-        vsh_run run = vsh_run_default();
-        FREED_BY(free_received)
-        received one = {.fail_at = 0}, more = {.fail_at = 0}, limited = {.fail_at = 0}, none = {.fail_at = 0};
-        run.threads = 1;
-        assert_ok(bake_into(&c, NULL, &run, &one, &failure));
-        run.threads = 4;
-        assert_ok(bake_into(&c, NULL, &run, &more, &failure));
-        run.threads = 2;
-        run.memory_limit = LIMIT;
-        assert_ok(bake_into(&c, at("."), &run, &limited, &failure));
-        const size_t bytes = (size_t)one.channels * SIZE * SIZE * sizeof(float);
-        assert_memory_equal(one.values, more.values, bytes);
-        assert_memory_equal(one.values, limited.values, bytes);
-        /* the folder is needed */
-        assert_int_equal(bake_into(&c, at("missing"), &run, &none, &failure), VSH_ERROR_WRITE);
-    }
-}
-
 TEST(an_error_of_the_callback_ends_the_bake) {
     case_scene c;
     fill(&c, SIZE, 1.0);
     FREED_BY(free_received) received t = {.fail_at = 2};
-    assert_int_equal(bake_into(&c, NULL, NULL, &t, &failure), VSH_ERROR_WRITE);
-    assert_string_equal(failure.message, "the disk is full");
+    assert_fails(bake_into(&c, NULL, NULL, &t, &failure), VSH_ERROR_WRITE, "the disk is full");
     assert_int_equal(t.calls, 2);
 }
 
@@ -159,25 +120,23 @@ TEST(lightmaps_are_known_before_anything_is_baked) {
     vsh_bake_options options = vsh_bake_options_default();
     options.loaded = note_loaded;
     options.user = &l;
-    assert_int_equal(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_INPUT);
-    assert_string_equal(failure.message, "no");
-    assert_int_equal(l.count, 1);
-    assert_int_equal(l.covered, 0);
+    assert_fails(vsh_bake_scene(&c.scene, &options, NULL, NULL, &failure), VSH_ERROR_INPUT, "no");
+    assert_true(l.count == 1 && l.covered == 0);
     assert_string_equal(l.output, c.output);
     assert_int_equal(access(c.output, F_OK), -1);
 }
 
-TEST(what_cannot_be_is_refused_before_a_file_is_read) {
+TEST(bad_outputs_are_refused_before_a_file_is_read) {
     case_scene c;
     fill(&c, SIZE, 1.0);
     unlink(c.mesh);
     c.receiver.output = "floor.xyz";
     assert_fails(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "floor.xyz");
     c.receiver.output = c.output;
-    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_READ);
+    assert_fails(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_READ, "");
     c.scene.receiver_count = 0;
-    assert_int_equal(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_receiver_check(&c.scene, 0, &failure), VSH_ERROR_ARGUMENT);
+    assert_fails(vsh_bake_scene(&c.scene, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vsh_receiver_check(&c.scene, 0, &failure), VSH_ERROR_ARGUMENT, "");
 }
 
 FIXTURE(make_folder, remove_folder)

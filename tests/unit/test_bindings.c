@@ -1,6 +1,5 @@
-/* What other languages call in place of callbacks that would be slow there. */
-#include "fields.h"
-#include "testing.h"
+/* Functions that replace callbacks which would be slow in other languages. */
+#include "handles.h"
 
 #include <pthread.h>
 #include <stdatomic.h>
@@ -20,48 +19,48 @@ static int32_t listen(void *user, const char *stage, double fraction) {
     return h->answer;
 }
 
-static vsh_progress_filter filter_to(heard *h, double seconds) {
-    vsh_progress_filter filter = vsh_progress_filter_default();
+static vshi_progress_filter filter_to(heard *h, double seconds) {
+    vshi_progress_filter filter = vshi_progress_filter_default();
     filter.progress = listen;
     filter.user = h;
     filter.seconds = seconds;
     return filter;
 }
 
-TEST(progress_is_handed_on_at_both_ends_and_seldom_between) {
+TEST(progress_is_passed_on_at_both_ends_and_seldom_between) {
     heard h = {0, 0, 0.0, pthread_self()};
-    vsh_progress_filter filter = filter_to(&h, 1e6);
+    vshi_progress_filter filter = filter_to(&h, 1e6);
     for (int i = 0; i <= 1000; ++i) {
-        assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.001 * i), 0);
+        assert_int_equal(vshi_progress_seldom(&filter, "stage", 0.001 * i), 0);
     }
     assert_int_equal(h.calls, 2);
     assert_true(h.last == 1.0);
     filter.seconds = 0.0;
-    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 0);
+    assert_int_equal(vshi_progress_seldom(&filter, "stage", 0.5), 0);
     assert_int_equal(h.calls, 3);
     filter.progress = NULL;
-    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 0);
-    assert_int_equal(vsh_progress_seldom(NULL, "stage", 0.5), 0);
+    assert_int_equal(vshi_progress_seldom(&filter, "stage", 0.5), 0);
+    assert_int_equal(vshi_progress_seldom(NULL, "stage", 0.5), 0);
 }
 
 TEST(an_answer_stays) {
     heard h = {0, 7, 0.0, pthread_self()};
-    vsh_progress_filter filter = filter_to(&h, vsh_progress_filter_default().seconds);
-    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.0), 7);
-    assert_int_equal(vsh_progress_seldom(&filter, "stage", 0.5), 7);
+    vshi_progress_filter filter = filter_to(&h, vshi_progress_filter_default().seconds);
+    assert_int_equal(vshi_progress_seldom(&filter, "stage", 0.0), 7);
+    assert_int_equal(vshi_progress_seldom(&filter, "stage", 0.5), 7);
     assert_int_equal(h.calls, 1);
 }
 
 static void *tell(void *filter) {
     for (int i = 0; i <= 100; ++i) {
-        vsh_progress_seldom(filter, "stage", 0.01 * i);
+        vshi_progress_seldom(filter, "stage", 0.01 * i);
     }
     return NULL;
 }
 
-TEST(one_thread_alone_hands_on) {
+TEST(one_thread_alone_passes_progress_on) {
     heard h = {0, 0, 0.0, pthread_self()};
-    vsh_progress_filter filter = filter_to(&h, 0.0);
+    vshi_progress_filter filter = filter_to(&h, 0.0);
     filter.thread = (uint64_t)pthread_self();
     pthread_t other;
     assert_int_equal(pthread_create(&other, NULL, tell, &filter), 0);
@@ -87,13 +86,12 @@ static void rings(void *user, size_t count, const double *positions, double *dis
 }
 
 /* Every distance of a box around it, bit by bit. */
-TEST(many_positions_at_once_give_the_same_level_set) {
+TEST(distances_of_many_positions_at_once_make_the_same_level_set) {
     const vsh_grid_options options = with_voxel(0.05);
     for (int exact = 0; exact < 2; ++exact) {
         atomic_int largest = 0;
         vsh_distance field = {ring, &largest, 1.0, exact, {-1, -0.3, -1}, {1, 0.3, 1}};
-        vsh_grid *grids[2];
-        assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grids[0], &failure));
+        vsh_grid *grids[2] = {grid_from_distance(&field, 0.05)};
         field.distance = NULL;
         assert_ok(vsh_grid_from_distances(&field, rings, &options, NULL, &grids[1], &failure));
         assert_int_equal(atomic_load(&largest), 64);
@@ -107,11 +105,13 @@ TEST(many_positions_at_once_give_the_same_level_set) {
     }
 }
 
-TEST(without_a_callback_there_is_none) {
+TEST(a_level_set_without_a_callback_is_refused) {
     const vsh_distance field = {NULL, NULL, 1.0, 1, {-1, -1, -1}, {1, 1, 1}};
-    vsh_grid *grid = (vsh_grid *)&failure;
-    assert_int_equal(vsh_grid_from_distances(&field, NULL, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT);
-    assert_null(grid);
-    assert_int_equal(vsh_grid_from_distances(NULL, rings, NULL, NULL, &grid, &failure), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_grid_from_distances(&field, rings, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT);
+    for (int i = 0; i < 3; ++i) { /* without a callback, a field, a place for the grid */
+        vsh_grid *grid = (vsh_grid *)&failure;
+        assert_fails(vsh_grid_from_distances(i == 1 ? NULL : &field, i == 0 ? NULL : rings, NULL, NULL,
+                                             i == 2 ? NULL : &grid, &failure),
+                     VSH_ERROR_ARGUMENT, "");
+        assert_true(i == 2 || grid == NULL);
+    }
 }

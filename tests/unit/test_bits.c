@@ -3,12 +3,13 @@
  * libraries is apart: a mesh's level set on OpenVDB, what is traced on Embree (docs/security.md). A change
  * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
  * the base set. */
-#include "base/hash.h"
+#include "base/bytes.h"
+#include "base/floats.h"
+#include "base/job.h"
 #include "casts.h"
 #include "field/field.h"
 #include "grids.h"
-#include "previews.h"
-#include "testing.h"
+#include "traced.h"
 
 /* --- hashing */
 
@@ -40,8 +41,14 @@ static double random_unit(uint64_t *counter) {
     return (double)(vshi_mix(++*counter * 0x9e3779b97f4a7c15u) >> 11) * 0x1p-53;
 }
 
-/* Rows over the floor, every third point anywhere with a normal to any side. */
-static void place_points(void) {
+enum { COLUMNS = 33, BALLS = 60 };
+
+static float hill_values[COLUMNS * COLUMNS];
+static double balls[4 * BALLS];
+
+/* Points: rows over the floor, every third one anywhere with a normal to any side. Made once, as a test
+ * computes in the host's floating-point setting. */
+static void make_inputs(void) {
     uint64_t counter = 1;
     for (size_t i = 0; i < POINTS; ++i) {
         double *p = positions + 3 * i;
@@ -49,7 +56,6 @@ static void place_points(void) {
         p[0] = -2.0 + 4.0 * ((double)(i % SIDE) + 0.5) / SIDE;
         p[1] = 0.001;
         p[2] = -2.0 + 4.0 * ((double)(i / SIDE) + 0.5) / SIDE;
-        n[0] = n[2] = 0.0f;
         n[1] = 1.0f;
         texels[i] = (uint32_t)(i % SIDE + 65536 * (i / SIDE));
         for (int axis = 0; axis < 3 && i % 3 == 0; ++axis) {
@@ -57,30 +63,29 @@ static void place_points(void) {
             n[axis] = (float)(random_unit(&counter) - 0.4);
         }
     }
+    counter = 7;
+    for (size_t i = 0; i < COUNT_OF(hill_values); ++i) {
+        hill_values[i] = (float)random_unit(&counter);
+    }
+    counter = 9;
+    for (size_t i = 0; i < COUNT_OF(balls); ++i) {
+        balls[i] = i % 4 == 3 ? 0.05 + 0.2 * random_unit(&counter) : -2.0 + 4.0 * random_unit(&counter);
+    }
 }
 
 static vsh_grid *solids(const vsh_run *run) {
-    vsh_sdf_node nodes[5];
-    for (int i = 0; i < 5; ++i) {
-        nodes[i] = vsh_sdf_node_default();
-    }
+    vsh_sdf_node nodes[5] = {box_node(2.5, 0.25, 2.5), vsh_sdf_node_default(),
+                             operation_node(VSH_SDF_UNION, 0, 1), vsh_sdf_node_default(),
+                             operation_node(VSH_SDF_UNION, 2, 3)};
     nodes[0].shape = VSH_SDF_PLANE;
-    nodes[0].size[0] = nodes[0].size[2] = 2.5;
-    nodes[0].size[1] = 0.25;
     nodes[1].radius = 0.5;
     nodes[1].translation[1] = 0.875;
-    nodes[2].shape = VSH_SDF_UNION;
-    nodes[2].left = 0;
-    nodes[2].right = 1;
     nodes[3].shape = VSH_SDF_TORUS;
     nodes[3].radius = 0.5;
     nodes[3].minor_radius = 0.125;
     nodes[3].rotation[0] = 0.25;
     nodes[3].translation[0] = 1.0;
     nodes[3].translation[1] = 0.75;
-    nodes[4].shape = VSH_SDF_UNION;
-    nodes[4].left = 2;
-    nodes[4].right = 3;
     const vsh_sdf sdf = {nodes, 5};
     const vsh_grid_options options = with_voxel(0.0625);
     vsh_grid *grid = NULL;
@@ -88,23 +93,15 @@ static vsh_grid *solids(const vsh_run *run) {
     return grid;
 }
 
-static vsh_light sun(void) {
-    vsh_light light = vsh_light_default();
-    light.direction[0] = 0.5;
-    light.direction[2] = 0.25;
-    light.angle = 0.25;
-    return light;
+static vsh_light usual_sun(void) {
+    return sun((const double[3]){0.5, 1.0, 0.25}, 0.25);
 }
 
 static vsh_light spot(void) {
-    vsh_light light = vsh_light_default();
+    vsh_light light = lamp((const double[3]){0.75, 2.5, -0.5}, 0.25);
     light.type = VSH_LIGHT_SPOT;
     light.falloff = VSH_FALLOFF_INVERSE_SQUARE;
     light.axis[1] = -1.0;
-    light.position[0] = 0.75;
-    light.position[1] = 2.5;
-    light.position[2] = -0.5;
-    light.radius = 0.25;
     strcpy(light.name, "spot");
     return light;
 }
@@ -122,8 +119,8 @@ typedef struct context {
     vsh_run run;
     vsh_grid *grid; /* of the solids */
     vsh_field *field;
-    const vsh_triangles *triangles; /* these two: NULL where there are none */
-    const vsh_layer *layer;
+    const vshi_triangles *triangles; /* these two: NULL where there are none */
+    const vshi_layer *layer;
 } context;
 
 static void level_set_of_solids(const context *c, int32_t unused, bits *b) {
@@ -133,9 +130,12 @@ static void level_set_of_solids(const context *c, int32_t unused, bits *b) {
 static void field_samples(const context *c, int32_t unused, bits *b) {
     float distance[POINTS];
     vsh_field_sample(c->field, POINTS, positions, distance);
+    const vshi_floats host = vshi_floats_get();
+    vshi_floats_set(VSHI_FLOATS_DEFAULT);
     for (size_t i = 0; i < POINTS; ++i) {
         distance[i] = 0.5f + 0.1f * distance[i];
     }
+    vshi_floats_set(host);
     add_floats(b, distance, POINTS);
 }
 
@@ -168,7 +168,7 @@ static void shade(const context *c, const vsh_light *light, vsh_shade_options *o
 static void shadow(const context *c, int32_t method, bits *b) {
     vsh_shade_options options = preview_options();
     options.method = method;
-    const vsh_light lights[] = {sun(), spot()};
+    const vsh_light lights[] = {usual_sun(), spot()};
     for (int i = 0; i < 2; ++i) {
         shade(c, &lights[i], &options, b);
     }
@@ -209,7 +209,7 @@ static void samplers(const context *c, int32_t sampler, bits *b) {
     options.method = VSH_SHADOW_RAYS;
     options.sampler = sampler;
     options.frame = 3;
-    const vsh_light light = sun();
+    const vsh_light light = usual_sun();
     shade(c, &light, &options, b);
 }
 
@@ -222,7 +222,7 @@ static void bent_normals(const context *c, int32_t method, bits *b) {
     assert_ok(
         vsh_shade_ao(occluders_of(c->field), &points, &options, &c->run, value, NULL, bent, NULL, &failure));
     add_floats(b, value, POINTS);
-    add_floats(b, bent, sizeof bent / sizeof bent[0]);
+    add_floats(b, bent, COUNT_OF(bent));
 }
 
 static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
@@ -234,17 +234,15 @@ static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
     assert_ok(vsh_shade_shadow(occluders_of(c->field), &points, &light, &options, &c->run, value, NULL, NULL,
                                &failure));
     vsh_shade_irradiance(&points, NULL, &light, value, rgb);
-    vsh_shade_tint(POINTS, value, &tint, tinted);
-    add_floats(b, rgb, sizeof rgb / sizeof rgb[0]);
-    add_floats(b, tinted, sizeof tinted / sizeof tinted[0]);
+    vshi_shade_tint(POINTS, value, &tint, tinted);
+    add_floats(b, rgb, COUNT_OF(rgb));
+    add_floats(b, tinted, COUNT_OF(tinted));
 }
 
 static void lightmap(const context *c, int32_t method, bits *b) {
     static const float corners[12] = {-2, 0, 2, 2, 0, 2, 2, 0, -2, -2, 0, -2};
     static const float uvs[8] = {0.125f, 0.125f, 0.875f, 0.125f, 0.875f, 0.875f, 0.125f, 0.875f};
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    const vsh_mesh floor = {
-        .positions = corners, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 2};
+    const vsh_mesh floor = quad_of_arrays(NULL, corners, uvs);
     enum { SIZE = 64, TEXELS = SIZE * SIZE };
     static float shadow_plane[TEXELS], ao_plane[TEXELS], rgb[3 * TEXELS], coverage[TEXELS];
     vsh_lightmap_options options = preview_lightmap_options();
@@ -255,7 +253,7 @@ static void lightmap(const context *c, int32_t method, bits *b) {
     float *planes[1] = {shadow_plane};
     vsh_lightmap map = {.shadow = planes, .ao = ao_plane, .irradiance = rgb, .coverage = coverage};
     OWNED(vsh_charts) *made = NULL;
-    const vsh_light light = sun();
+    const vsh_light light = usual_sun();
     assert_ok(vsh_charts_create(&floor, 1, &options, &c->run, NULL, &made, &failure));
     assert_ok(vsh_bake_lightmap(occluders_of(c->field), made, &light, 1, &options.shade, &c->run, &map, NULL,
                                 &failure));
@@ -272,8 +270,7 @@ static void seams(const context *c, int32_t unused, bits *b) {
     static const float uvs[16] = {0.05f, 0.07f, 0.37f, 0.07f, 0.37f, 0.81f, 0.05f, 0.81f,
                                   0.50f, 0.20f, 0.67f, 0.06f, 0.96f, 0.63f, 0.79f, 0.77f};
     static const uint32_t indices[12] = {0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7};
-    const vsh_mesh mesh = {
-        .positions = corners, .uvs = uvs, .indices = indices, .vertex_count = 8, .triangle_count = 4};
+    const vsh_mesh mesh = mesh_of_arrays(NULL, corners, uvs, 8, indices, 4);
     enum { STITCHED = 48, STITCHED_TEXELS = STITCHED * STITCHED };
     static float open[STITCHED_TEXELS], light[3 * STITCHED_TEXELS];
     vsh_lightmap_options options = vsh_lightmap_options_default();
@@ -287,7 +284,7 @@ static void seams(const context *c, int32_t unused, bits *b) {
     const vsh_lightmap map = {.ao = open, .irradiance = light};
     OWNED(vsh_charts) *charts = NULL;
     assert_ok(vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, &failure));
-    assert_ok(vsh_lightmap_stitch(charts, &map, 0, NULL, run, NULL, &failure));
+    assert_ok(stitch_one(charts, &map, 0, NULL, run, NULL, &failure));
     add_floats(b, open, STITCHED_TEXELS);
     add_floats(b, light, 3 * STITCHED_TEXELS);
 }
@@ -298,7 +295,7 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
     vsh_volume_options options = preview_volume_options();
     options.ao = 1;
     options.shade.ao_distance = 0.75;
-    const vsh_light light = sun();
+    const vsh_light light = usual_sun();
     assert_ok(vsh_voxels_from_grid(c->grid, 0.0, &c->run, &voxels, &failure));
     assert_ok(vsh_bake_volume(occluders_of(c->field), voxels, &light, 1, &options, &c->run, &volume, NULL,
                               &failure));
@@ -318,49 +315,37 @@ static void volume_of_band(const context *c, int32_t unused, bits *b) {
 }
 
 /* Casters without voxels, as the one layer beside an empty field. */
-static void shade_layer(const context *c, const vsh_heights *heights, const vsh_spheres *spheres, bits *b) {
+static void shade_layer(const context *c, const vshi_heights *heights, const vshi_spheres *spheres, bits *b) {
     OWNED(vsh_field) *empty = NULL;
     assert_ok(vshi_field_create_empty(0.0625, &empty, &failure));
-    vsh_layer layer = vsh_layer_default();
+    vshi_layer layer = vshi_layer_default();
     layer.heights = heights;
     layer.spheres = spheres;
     layer.method = VSH_SHADOW_CLASSIC;
     vsh_shade_options options = preview_options();
     const context here = {c->run, NULL, empty, NULL, &layer};
-    const vsh_light lights[] = {sun(), spot()};
+    const vsh_light lights[] = {usual_sun(), spot()};
     for (int i = 0; i < 2; ++i) {
         shade(&here, &lights[i], &options, b);
     }
     shade(&here, NULL, &options, b);
 }
 
-enum { COLUMNS = 33 };
-
 static vsh_heights_source hills(void) {
-    static float values[COLUMNS * COLUMNS];
-    uint64_t counter = 7;
-    for (size_t i = 0; i < sizeof values / sizeof values[0]; ++i) {
-        values[i] = (float)random_unit(&counter);
-    }
     return (vsh_heights_source){
-        .columns = COLUMNS, .rows = COLUMNS, .values = values, .size = {5.0, 5.0}, .height = 0.75};
+        .columns = COLUMNS, .rows = COLUMNS, .values = hill_values, .size = {5.0, 5.0}, .height = 0.75};
 }
 
 static void heightfield(const context *c, int32_t unused, bits *b) {
     const vsh_heights_source source = hills();
-    OWNED(vsh_heights) *heights = NULL;
-    assert_ok(vsh_heights_create(&source, &c->run, &heights, &failure));
+    OWNED(vshi_heights) *heights = NULL;
+    assert_ok(vshi_heights_create(&source, &c->run, &heights, &failure));
     shade_layer(c, heights, NULL, b);
 }
 
 static void spheres(const context *c, int32_t unused, bits *b) {
-    double list[4 * 60];
-    uint64_t counter = 9;
-    for (size_t i = 0; i < sizeof list / sizeof list[0]; ++i) {
-        list[i] = i % 4 == 3 ? 0.05 + 0.2 * random_unit(&counter) : -2.0 + 4.0 * random_unit(&counter);
-    }
-    OWNED(vsh_spheres) *made = NULL;
-    assert_ok(vsh_spheres_create(list, 60, NULL, &c->run, &made, &failure));
+    OWNED(vshi_spheres) *made = NULL;
+    assert_ok(vshi_spheres_create(balls, BALLS, NULL, &c->run, &made, &failure));
     shade_layer(c, NULL, made, b);
 }
 
@@ -380,7 +365,7 @@ static void flat_map(const context *c, int32_t method, bits *b) {
     light.position[1] = 0.75;
     float *const shadows[] = {planes[0]}, *const rgb[] = {planes[1], planes[2], planes[3]};
     const vsh_flat_map map = {shadows, rgb, planes[4]};
-    assert_ok(vsh_flat_bake(outline, &light, 1, &options, &c->run, &map, &failure));
+    assert_ok(vshi_flat_bake(outline, &light, 1, &options, &c->run, &map, &failure));
     add_floats(b, planes[0], 5 * TEXELS);
 }
 
@@ -407,7 +392,7 @@ static void picture(const context *c, int32_t unused, bits *b) {
     add_floats(b, encoded[0], 3 * PIXELS);
 }
 
-/* --- what depends on libraries */
+/* --- parts that depend on libraries */
 
 enum { MOST_MESHES = 64 };
 
@@ -457,10 +442,13 @@ static void cut_out(vsh_mesh *mesh, vsh_alpha_mask *mask, float **uvs) {
     }
     *uvs = malloc(2 * mesh->vertex_count * sizeof **uvs);
     assert_non_null(*uvs);
+    const vshi_floats host = vshi_floats_get();
+    vshi_floats_set(VSHI_FLOATS_DEFAULT);
     for (size_t i = 0; i < mesh->vertex_count; ++i) {
         (*uvs)[2 * i] = 3.0f * mesh->positions[3 * i];
         (*uvs)[2 * i + 1] = 3.0f * mesh->positions[3 * i + 2];
     }
+    vshi_floats_set(host);
     *mask = (vsh_alpha_mask){.alpha = alpha,
                              .width = 7,
                              .height = 5,
@@ -481,7 +469,7 @@ static void exact(const context *c, int32_t what, bits *b) {
     const vsh_heights_source source = hills();
     OWNED(vsh_model) *model = NULL;
     OWNED(vsh_grid) *grid = NULL;
-    OWNED(vsh_triangles) *triangles = NULL;
+    OWNED(vshi_triangles) *triangles = NULL;
     context here = {.run = c->run};
     assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &c->run, &model, &failure));
     vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -491,15 +479,15 @@ static void exact(const context *c, int32_t what, bits *b) {
     vsh_grid_options options = vsh_grid_options_default();
     options.resolution = (what & CUT_OUT) != 0 ? 16 : 64;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &failure));
-    assert_ok(vsh_field_create(grid, NULL, &c->run, &here.field, &failure));
-    assert_ok(vsh_triangles_create(&mesh, 1, &c->run, &triangles, &failure));
+    assert_ok(vshi_field_create(grid, NULL, &c->run, &here.field, &failure));
+    assert_ok(vshi_triangles_create(&mesh, 1, &c->run, &triangles, &failure));
     vsh_shade_options shading = preview_options();
     shading.method = VSH_SHADOW_EXACT;
     shading.ao_method = VSH_AO_EXACT;
     here.triangles = triangles;
-    const vsh_light light = sun();
+    const vsh_light light = usual_sun();
     shade(&here, (what & OF_AO) != 0 ? NULL : &light, &shading, b);
-    vsh_field_free(here.field);
+    vshi_field_free(here.field);
 }
 
 /* --- the table */
@@ -517,16 +505,16 @@ static const part parts[] = {
 
 static void bake_part(const part *p, const vsh_run *run, bits *b) {
     context c = {.run = *run, .grid = solids(run)};
-    assert_ok(vsh_field_create(c.grid, NULL, run, &c.field, &failure));
+    assert_ok(vshi_field_create(c.grid, NULL, run, &c.field, &failure));
     *b = (bits){0, 0, 0};
     p->bake(&c, p->what, b);
-    vsh_field_free(c.field);
+    vshi_field_free(c.field);
     vsh_grid_free(c.grid);
 }
 
 static void print_table(void) {
     const vsh_run run = vsh_run_default();
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(parts); ++i) {
         bits b;
         bake_part(&parts[i], &run, &b);
         printf("%-28s 0x%016llx\n", parts[i].name, (unsigned long long)b.hash);
@@ -537,10 +525,10 @@ TEST(every_part_has_its_bits_for_any_threads_and_instruction_set) {
     bool wrong = false;
     const bool once = getenv("VSH_BITS") != NULL;
     for (int32_t isa = VSH_ISA_BASE; isa <= (once ? VSH_ISA_BASE : VSH_ISA_AVX512); ++isa) {
-        for (int32_t threads = 1; threads <= (once ? 1 : 5) && vsh_isa_available(isa); threads += 4) {
+        for (int32_t threads = 1; threads <= (once ? 1 : 5) && vshi_isa_available(isa); threads += 4) {
             vsh_run run = run_on(threads);
             run.isa = isa;
-            for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+            for (size_t i = 0; i < COUNT_OF(parts); ++i) {
                 bits b;
                 bake_part(&parts[i], &run, &b);
                 assert_true(b.changes > 20);
@@ -557,17 +545,125 @@ TEST(every_part_has_its_bits_for_any_threads_and_instruction_set) {
 }
 
 TEST(parts_have_bits_of_their_own) {
-    for (size_t i = 0; i < sizeof parts / sizeof parts[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(parts); ++i) {
         for (size_t j = 0; j < i; ++j) {
-            if (parts[i].hash == parts[j].hash) {
-                fail_msg("%s has the bits of %s", parts[i].name, parts[j].name);
-            }
+            assert_that(parts[i].hash != parts[j].hash, "%s has the bits of %s", parts[i].name,
+                        parts[j].name);
         }
     }
 }
 
+/* --- the host's floating-point environment */
+
+#if defined(__x86_64__)
+/* MXCSR: flush to zero, denormals are zero, both; then rounding down, up, to zero, all of it, and nothing
+ * masked but inexact results and denormals. */
+static const vshi_floats SETTINGS[] = {0x9f80, 0x1fc0, 0x9fc0, 0x3f80, 0x5f80, 0x7f80, 0xffc0, 0x1100};
+#elif defined(__aarch64__)
+static const vshi_floats SETTINGS[] = {1u << 24, 1u << 22, 2u << 22, 3u << 22};
+#else
+static const vshi_floats SETTINGS[] = {VSHI_FLOATS_DEFAULT};
+#endif
+
+static int32_t count_strange(void *user, const char *stage, double fraction) {
+    *(size_t *)user += vshi_floats_differ(vshi_floats_get()) != 0;
+    return 0;
+}
+
+TEST(no_setting_of_the_host_changes_bits_and_all_are_given_back) {
+    for (size_t s = 0; s < (getenv("VSH_BITS") != NULL ? 0 : COUNT_OF(SETTINGS)); ++s) {
+        for (size_t i = 0; i < COUNT_OF(parts); ++i) {
+            size_t strange = 0; /* calls of the callback in another setting than the default one */
+            vsh_run run = run_watched(count_strange, &strange);
+            run.threads = (int32_t)(s + i) % 3;
+            bits b;
+            vshi_floats_set(SETTINGS[s]);
+            bake_part(&parts[i], &run, &b);
+            const vshi_floats after = vshi_floats_get(), flags = VSHI_FLOATS_FLAGS;
+            vshi_floats_set(VSHI_FLOATS_DEFAULT);
+            assert_that(b.hash == parts[i].hash && strange == 0,
+                        "%s, setting %#llx: other bits, or %zu callbacks in it", parts[i].name,
+                        (unsigned long long)SETTINGS[s], strange);
+            /* flags that say what has happened may be added */
+            assert_true((after & ~flags) == (SETTINGS[s] & ~flags));
+        }
+    }
+}
+
+/* A torus. Threads of the pool ask for its distances. */
+static double ring(void *user, const double p[3]) {
+    const bool strange = vshi_floats_differ(vshi_floats_get()) != 0;
+    return strange ? (double)NAN /* is refused */ : hypot(hypot(p[0], p[2]) - 1.0, p[1]) - 0.31;
+}
+
+TEST(distance_callbacks_run_in_the_default_setting) {
+    const vsh_distance field = {ring, NULL, 1.0, 0, {-1.4, -0.4, -1.4}, {1.4, 0.4, 1.4}};
+    for (size_t s = 0; s < COUNT_OF(SETTINGS); ++s) {
+        vshi_floats_set(SETTINGS[s]);
+        vsh_grid *grid = grid_from_distance(&field, 0.1);
+        vshi_floats_set(VSHI_FLOATS_DEFAULT);
+        vsh_grid_free(grid);
+    }
+}
+
+/* Lengths that are denormal numbers, and scenes that have them, keep their values. */
+TEST(denormals_are_numbers) {
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.1, 2.0);
+    const double p[3] = {0.3, 1e-310, 0.2}, zero[3] = {0.3, 0.0, 0.2};
+    const float tiny[3] = {0.0f, 1e-41f, 1e-44f}, up[3] = {0.0f, 1.0f, 0.0f};
+    const double towards[3] = {5e-324, 1e-310, 0.0};
+    const vsh_light light = sun(towards, 1e-310), straight = sun((const double[]){0.0, 1.0, 0.0}, 0.0);
+    for (size_t s = 0; s < COUNT_OF(SETTINGS); ++s) {
+        for (int32_t method = 0; method < SHADOW_METHODS + AO_METHODS; ++method) {
+            const int32_t ao_method = method - SHADOW_METHODS;
+            vshi_floats_set(SETTINGS[s]);
+            const float a = ao_method < 0 ? cast_shadow_at(&c, &light, method, p, tiny)
+                                          : cast_ao_at(&c, ao_method, 1.0, p, tiny);
+            const float b = ao_method < 0 ? cast_shadow_at(&c, &straight, method, zero, up)
+                                          : cast_ao_at(&c, ao_method, 1.0, zero, up);
+            vshi_floats_set(VSHI_FLOATS_DEFAULT);
+            /* the normal is turned by a thousandth */
+            assert_true(ao_method < 0 ? bits_of(a) == bits_of(b) : fabsf(a - b) <= 1e-2f);
+            assert_true(ao_method < 0 || bits_of(b) == bits_of(cast_ao_at(&c, ao_method, 1.0, zero, up)));
+        }
+    }
+}
+
+/* --- instruction sets */
+
+TEST(an_instruction_set_that_is_missing_or_unknown_is_refused_by_name) {
+    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.2, 1.0);
+    const double place[3] = {0.0, 3.0, 0.0};
+    const vsh_points points = {1, place, NULL, NULL};
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    vsh_run run = vsh_run_default();
+    float value;
+    for (int32_t isa = -1; isa <= VSHI_ISA_COUNT; ++isa) {
+        const char *name = vsh_get_name(VSH_NAMES_ISA, isa);
+        run.isa = isa;
+        for (int k = 0; k < 2; ++k) {
+            assert_fails(vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL,
+                                          NULL, &failure),
+                         vshi_isa_available(isa) ? VSH_OK : VSH_ERROR_ARGUMENT,
+                         k == 0 || name == NULL ? "isa" : name);
+        }
+    }
+    /* a run from before it had an instruction set */
+    run.isa = -1;
+    run.struct_size = offsetof(vsh_run, isa);
+    assert_ok(
+        vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &failure));
+}
+
+TEST(the_best_instruction_set_is_one_of_this_machine) {
+    assert_true(vshi_isa_available(VSH_ISA_BASE) && vshi_isa_available(VSH_ISA_BEST));
+    assert_false(vshi_isa_available(-1) || vshi_isa_available(VSHI_ISA_COUNT));
+    const int32_t best = vshi_isa_resolve(VSH_ISA_BEST);
+    assert_true(best >= VSH_ISA_BASE && vshi_isa_available(best));
+}
+
 int main(void) {
-    place_points();
+    make_inputs();
     const char *how = getenv("VSH_BITS");
     if (how != NULL && strcmp(how, "print") == 0) {
         print_table();

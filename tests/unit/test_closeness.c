@@ -1,6 +1,5 @@
-/* Charts that are too close: what is found is what looking at all borders finds. */
+/* Gaps between charts, compared with those of all borders. */
 #include "fields.h"
-#include "testing.h"
 
 enum { CHARTS = 60, WIDTH = 96, HEIGHT = 64 };
 
@@ -13,7 +12,6 @@ typedef struct charts {
 } charts;
 
 static vsh_mesh place(charts *c, uint64_t seed, double longest) {
-    static const uint32_t corners[6] = {0, 1, 2, 0, 2, 3};
     for (int i = 0; i < c->count; ++i) {
         for (int axis = 0; axis < 2; ++axis) {
             const double most = axis == 0 ? WIDTH : HEIGHT;
@@ -35,16 +33,10 @@ static vsh_mesh place(charts *c, uint64_t seed, double longest) {
             *(k >= 2 ? &c->high[i][1] : &c->low[i][1]) = (1.0 - (double)uv[1]) * HEIGHT;
         }
         for (int k = 0; k < 6; ++k) {
-            c->indices[6 * i + k] = (uint32_t)(4 * i) + corners[k];
+            c->indices[6 * i + k] = (uint32_t)(4 * i) + QUAD_ORDER[k];
         }
     }
-    vsh_mesh mesh = {.positions = NULL};
-    mesh.positions = c->positions;
-    mesh.uvs = c->uvs;
-    mesh.indices = c->indices;
-    mesh.vertex_count = 4 * (size_t)c->count;
-    mesh.triangle_count = 2 * (size_t)c->count;
-    return mesh;
+    return mesh_of_arrays(NULL, c->positions, c->uvs, 4 * (size_t)c->count, c->indices, 2 * (size_t)c->count);
 }
 
 /* From a place to the border of a rectangle. */
@@ -79,7 +71,7 @@ static double nearest_of(const charts *c, int chart) {
     return nearest;
 }
 
-TEST(the_least_gap_is_that_of_all_borders) {
+TEST(the_least_gap_is_the_one_between_all_borders) {
     static charts c;
     int apart = 0, close = 0;
     for (uint64_t seed = 1; seed <= 60; ++seed) {
@@ -89,8 +81,8 @@ TEST(the_least_gap_is_that_of_all_borders) {
         for (int i = 0; i < c.count; ++i) {
             truth = fmin(truth, nearest_of(&c, i));
         }
-        vsh_closeness found;
-        assert_ok(vsh_charts_closeness(&mesh, 1, WIDTH, HEIGHT, NULL, &found, &failure));
+        vshi_closeness found;
+        assert_ok(vshi_charts_closeness(&mesh, 1, WIDTH, HEIGHT, NULL, &found, &failure));
         assert_float_equal(found.gap, truth, 1e-4);
         assert_true((found.texels > 0) == (truth < 1.0));
         close += truth < 1.0;

@@ -1,49 +1,33 @@
-/* Files compared: what tolerances say is put over the defaults, what they must not say is refused, and what
- * two images come to. */
+/* Files compared: tolerances change the default limits, bad tolerance files are refused, and two images are
+ * compared channel by channel. */
+#include "folder.h"
 
-#include "testing.h"
-static char path[64];
-
-static int make_file(void **state) {
-    strcpy(path, "tolerances-XXXXXX");
-    const int file = mkstemp(path);
-    return file < 0 || close(file) != 0;
-}
-
-static int remove_file(void **state) {
-    return unlink(path);
-}
-
-static vsh_result read_text(const char *text, vsh_tolerances **tolerances, vsh_error *error) {
-    FILE *file = fopen(path, "wb");
-    assert_non_null(file);
-    fputs(text, file);
-    assert_int_equal(fclose(file), 0);
-    return vsh_tolerances_read(path, tolerances, error);
+static vsh_result read_tolerances(const char *text, vshi_tolerances **tolerances) {
+    write_string(at("tolerances.json"), text);
+    return vshi_tolerances_read(at("tolerances.json"), tolerances, &failure);
 }
 
 static vsh_limits limits_of(const char *text, const char *channel, double *coverage) {
-    OWNED(vsh_tolerances) *tolerances = NULL;
-    assert_ok(read_text(text, &tolerances, &failure));
-    vsh_limits limits = vsh_limits_default();
-    vsh_tolerances_apply(tolerances, channel, &limits, coverage);
+    OWNED(vshi_tolerances) *tolerances = NULL;
+    assert_ok(read_tolerances(text, &tolerances));
+    vsh_limits limits = vshi_limits_default();
+    vshi_tolerances_apply(tolerances, channel, &limits, coverage);
     return limits;
 }
 
-TEST(what_a_file_does_not_say_stays) {
-    const vsh_limits defaults = vsh_limits_default(), limits = limits_of("{}", "ao", NULL);
+TEST(limits_that_a_file_lacks_keep_their_defaults) {
+    const vsh_limits defaults = vshi_limits_default(), limits = limits_of("{}", "ao", NULL);
     assert_memory_equal(&limits, &defaults, sizeof limits);
     vsh_limits same = defaults;
-    vsh_tolerances_apply(NULL, "ao", &same, NULL);
+    vshi_tolerances_apply(NULL, "ao", &same, NULL);
     assert_memory_equal(&same, &defaults, sizeof same);
 }
 
 TEST(every_measure_but_one_has_a_key_of_its_name) {
-    const vsh_limits defaults = vsh_limits_default();
     for (int i = 1; i < VSH_MEASURE_COUNT; ++i) {
         char text[64];
         snprintf(text, sizeof text, "{\"%s\": 0.625}", vsh_get_name(VSH_NAMES_MEASURE, i));
-        vsh_limits expected = defaults;
+        vsh_limits expected = vshi_limits_default();
         expected.value[i] = 0.625;
         const vsh_limits limits = limits_of(text, "shadow.sun", NULL);
         assert_memory_equal(&limits, &expected, sizeof limits);
@@ -52,21 +36,25 @@ TEST(every_measure_but_one_has_a_key_of_its_name) {
     assert_true(isinf(off.value[VSH_MEASURE_MAX]));
 }
 
-TEST(channels_come_over_the_rest_in_their_order) {
+TEST(channels_replace_general_limits_in_their_order) {
     static const char text[] = "{\"rmse\": 0.5, \"coverage\": 0.25, \"step\": 0.125, \"channels\": {"
                                "\"shadow.*\": {\"rmse\": 0.25, \"reach\": 4},"
                                "\"shadow.sun\": {\"rmse\": 0.0625, \"step\": 0.5}, \"*\": {\"max\": 0.5}}}";
-    double coverage = -1.0;
-    const vsh_limits sun = limits_of(text, "shadow.sun", &coverage),
-                     lamp = limits_of(text, "shadow.lamp", NULL);
-    const vsh_limits ao = limits_of(text, "ao", NULL), sunny = limits_of(text, "shadow.sunny", NULL);
-    assert_true(coverage == 0.25);
-    assert_true(sun.value[VSH_MEASURE_RMSE] == 0.0625 && sun.options.step == 0.5 && sun.options.reach == 4);
-    assert_true(lamp.value[VSH_MEASURE_RMSE] == 0.25 && lamp.options.step == 0.125 &&
-                lamp.options.reach == 4);
-    assert_true(sunny.value[VSH_MEASURE_RMSE] == 0.25 && sunny.options.step == 0.125);
-    assert_true(ao.value[VSH_MEASURE_RMSE] == 0.5 && ao.options.reach == 2 && ao.options.step == 0.125);
-    assert_true(ao.value[VSH_MEASURE_MAX] == 0.5 && sun.value[VSH_MEASURE_MAX] == 0.5);
+    static const struct {
+        const char *channel;
+        double rmse, step;
+        int32_t reach;
+    } cases[] = {{"shadow.sun", 0.0625, 0.5, 4},
+                 {"shadow.lamp", 0.25, 0.125, 4},
+                 {"shadow.sunny", 0.25, 0.125, 4},
+                 {"ao", 0.5, 0.125, 2}};
+    for (size_t i = 0; i < 4; ++i) {
+        double coverage = -1.0;
+        const vsh_limits limits = limits_of(text, cases[i].channel, &coverage);
+        assert_true(limits.value[VSH_MEASURE_RMSE] == cases[i].rmse && limits.options.step == cases[i].step);
+        assert_true(limits.options.reach == cases[i].reach && limits.value[VSH_MEASURE_MAX] == 0.5);
+        assert_true(coverage == 0.25);
+    }
 }
 
 TEST(bad_files_are_refused_with_the_place) {
@@ -86,26 +74,21 @@ TEST(bad_files_are_refused_with_the_place) {
         {"{\"rmse\": 1,}", {"1:", ""}},
         {"", {"1:", ""}},
     };
+    vshi_tolerances *tolerances = NULL;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        vsh_tolerances *tolerances = NULL;
-        assert_int_equal(read_text(cases[i].text, &tolerances, &failure), VSH_ERROR_INPUT);
-        assert_null(tolerances);
         for (int k = 0; k < 2; ++k) {
-            if (strstr(failure.message, cases[i].words[k]) == NULL) {
-                fail_msg("'%s' is not in '%s'", cases[i].words[k], failure.message);
-            }
+            assert_fails(read_tolerances(cases[i].text, &tolerances), VSH_ERROR_INPUT, cases[i].words[k]);
+            assert_null(tolerances);
         }
     }
-    vsh_tolerances *tolerances = NULL;
-    assert_int_equal(vsh_tolerances_read("no/such/file.json", &tolerances, NULL), VSH_ERROR_READ);
+    assert_fails(vshi_tolerances_read("no/such/file.json", &tolerances, &failure), VSH_ERROR_READ, "");
 }
 
 /* --- whole files */
 
 enum { SIDE = 16, COUNT = SIDE * SIDE };
 
-/* An image beside the tolerance file: `ao` of a slope, with one texel `spot` off; and A, where it is named.
- */
+/* An image: `ao` of a slope, with one texel `spot` off; and A, if there are two channels. */
 static void write_image(const char *image, int32_t width, float spot, int32_t channels) {
     float ao[COUNT], covered[COUNT];
     for (size_t i = 0; i < COUNT; ++i) {
@@ -129,53 +112,46 @@ static int32_t look(void *user, size_t index, const vsh_channel_comparison *chan
     return user != NULL;
 }
 
-TEST(two_files_are_compared_channel_by_channel) {
-    char golden[80], fresh[80];
-    snprintf(golden, sizeof golden, "%s.golden.exr", path);
-    snprintf(fresh, sizeof fresh, "%s.new.exr", path);
-    vsh_compare_files_options options = vsh_compare_files_options_default();
+static vsh_comparison *compare(const vsh_compare_files_options *options, bool alike) {
     vsh_comparison *c = NULL;
-    write_image(golden, SIDE, 0.0f, 2);
-    write_image(fresh, SIDE, 0.0f, 2);
-    assert_ok(vsh_compare_files(golden, fresh, NULL, NULL, &c, &failure));
-    assert_int_equal(vsh_comparison_alike(c), 1);
-    assert_null(vsh_comparison_problem(c, 0));
-    assert_int_equal(vsh_comparison_channel(c, 0)->is_coverage, 1);
-    assert_string_equal(vsh_comparison_channel(c, 1)->name, "ao");
-    assert_int_equal(vsh_comparison_channel(c, 1)->measures.count, COUNT);
-    assert_null(vsh_comparison_channel(c, 2));
-    vsh_comparison_free(c);
+    assert_ok(vsh_compare_files(at("golden.exr"), at("new.exr"), options, NULL, &c, &failure));
+    assert_int_equal(vsh_comparison_alike(c), alike);
+    return c;
+}
 
-    write_image(fresh, SIDE, 0.4f, 2);
+TEST(two_files_are_compared_channel_by_channel) {
+    write_image(at("golden.exr"), SIDE, 0.0f, 2);
+    write_image(at("new.exr"), SIDE, 0.0f, 2);
+    OWNED(vsh_comparison) *same = compare(NULL, true);
+    assert_null(vsh_comparison_problem(same, 0));
+    assert_int_equal(vsh_comparison_channel(same, 0)->is_coverage, 1);
+    assert_string_equal(vsh_comparison_channel(same, 1)->name, "ao");
+    assert_int_equal(vsh_comparison_channel(same, 1)->measures.count, COUNT);
+    assert_null(vsh_comparison_channel(same, 2));
+
+    vsh_compare_files_options options = vsh_compare_files_options_default();
+    write_image(at("new.exr"), SIDE, 0.4f, 2);
     options.look = look;
-    assert_ok(vsh_compare_files(golden, fresh, &options, NULL, &c, &failure));
+    OWNED(vsh_comparison) *spot = compare(&options, false);
     assert_int_equal(seen, 1);
-    assert_int_equal(vsh_comparison_alike(c), 0);
-    const vsh_channel_comparison *ao = vsh_comparison_channel(c, 1);
-    assert_true(ao->failed >> VSH_MEASURE_MAX & 1);
-    assert_int_equal(ao->measures.worst, COUNT / 2);
-    vsh_comparison_free(c);
+    assert_true(vsh_comparison_channel(spot, 1)->failed >> VSH_MEASURE_MAX & 1);
+    assert_int_equal(vsh_comparison_channel(spot, 1)->measures.worst, COUNT / 2);
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         options.limits[i] = 1e9;
     }
-    assert_ok(vsh_compare_files(golden, fresh, &options, NULL, &c, &failure));
-    assert_int_equal(vsh_comparison_alike(c), 1);
-    vsh_comparison_free(c);
+    OWNED(vsh_comparison) *wide = compare(&options, true), *none = NULL;
     options.user = &options;
-    assert_int_equal(vsh_compare_files(golden, fresh, &options, NULL, &c, &failure), VSH_ERROR_CANCELLED);
-    assert_null(c);
+    assert_fails(vsh_compare_files(at("golden.exr"), at("new.exr"), &options, NULL, &none, &failure),
+                 VSH_ERROR_CANCELLED, "");
+    assert_null(none);
 
-    write_image(fresh, 2 * SIDE, 0.0f, 1);
-    assert_ok(vsh_compare_files(golden, fresh, NULL, NULL, &c, &failure));
-    assert_int_equal(vsh_comparison_alike(c), 0);
-    assert_string_equal(vsh_comparison_problem(c, 0), "channel 'A': in golden alone");
-    assert_string_equal(vsh_comparison_problem(c, 1), "size: golden is 16 × 16, new is 32 × 8");
-    assert_null(vsh_comparison_channel(c, 0));
-    vsh_comparison_free(c);
-
-    assert_int_equal(unlink(fresh), 0);
-    assert_int_equal(vsh_compare_files(golden, fresh, NULL, NULL, &c, &failure), VSH_ERROR_READ);
-    assert_int_equal(unlink(golden), 0);
+    write_image(at("new.exr"), 2 * SIDE, 0.0f, 1);
+    OWNED(vsh_comparison) *other = compare(NULL, false);
+    assert_string_equal(vsh_comparison_problem(other, 0), "channel 'A': in golden alone");
+    assert_string_equal(vsh_comparison_problem(other, 1), "size: golden is 16 × 16, new is 32 × 8");
+    assert_null(vsh_comparison_channel(other, 0));
+    assert_fails(vsh_compare_files(at("golden.exr"), at("missing.exr"), NULL, NULL, &none, &failure),
+                 VSH_ERROR_READ, "");
 }
 
-FIXTURE(make_file, remove_file)
+FIXTURE(make_folder, remove_folder)

@@ -1,7 +1,7 @@
-/* Files whose materials cut out what casts: from glTF and its textures to what rays meet, in the process
- * itself and by a reader, which is this test. */
+/* Materials that cut out casters: from glTF and its textures to rays, in the process itself and by a reader,
+ * which is this test. */
 #include "gltf_maker.h"
-#include "testing.h"
+#include "handles.h"
 
 #include "base/vec.h"
 #include "trace/embree.h"
@@ -14,16 +14,6 @@ typedef struct bytes {
     unsigned char *at;
     size_t size;
 } bytes;
-
-static bytes read_file(const char *path) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    bytes b = {malloc(1 << 20), 0};
-    b.size = fread(b.at, 1, 1 << 20, file);
-    fclose(file);
-    assert_true(b.size > 0 && b.size < 1 << 20);
-    return b;
-}
 
 /* The disc in the alpha of an image: 1 in it, `outside` out of it. */
 static bytes disc_image(float outside) {
@@ -45,7 +35,12 @@ static bytes disc_image(float outside) {
     options.pack = "R=R,G=G,B=B,A=A";
     const file_path path = path_of("disc.png");
     assert_ok(vsh_image_write(path.text, &image, &options, &failure));
-    const bytes b = read_file(path.text);
+    bytes b;
+    FILE *file = fopen(path.text, "rb");
+    assert_non_null(file);
+    b.at = malloc(1 << 20);
+    b.size = fread(b.at, 1, 1 << 20, file);
+    fclose(file);
     assert_int_equal(unlink(path.text), 0);
     return b;
 }
@@ -106,7 +101,6 @@ typedef struct card {
     float scale;          /* of UVs; 1 */
     bool reader, cast_blended;
     uint64_t memory_limit;
-    const char *const *one_sided, *const *except; /* a pattern */
 } card;
 
 static vsh_result load(card c, vsh_assets **assets) {
@@ -115,12 +109,8 @@ static vsh_result load(card c, vsh_assets **assets) {
     write_card(c.material != NULL ? c.material : MASKED(""), c.sampler != NULL ? c.sampler : "{}",
                c.uri != NULL ? c.uri : own, c.scale > 0.0f ? c.scale : 1.0f);
     const file_path path = path_of("a.gltf");
-    vsh_caster caster = {.type = VSH_CASTER_MESH,
-                         .path = path.text,
-                         .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
-                         .one_sided = c.one_sided,
-                         .one_sided_count = c.one_sided != NULL,
-                         .objects = {.except = c.except, .except_count = c.except != NULL}};
+    vsh_caster caster = {
+        .type = VSH_CASTER_MESH, .path = path.text, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     vsh_scene scene = vsh_scene_default();
     scene.casters = &caster;
     scene.caster_count = 1;
@@ -144,8 +134,7 @@ static vsh_result load(card c, vsh_assets **assets) {
 static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z)) {
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
-    OWNED(vsh_triangles) *triangles = NULL;
-    assert_ok(vsh_triangles_create(meshes, count, NULL, &triangles, &failure));
+    OWNED(vshi_triangles) *triangles = triangles_from(meshes, count);
     int met = 0, asked = 0;
     for (int i = 0; i < 79 * 79; ++i) {
         const double x = -0.98 + 0.025 * (i % 79), z = -0.98 + 0.025 * (i / 79);
@@ -153,13 +142,9 @@ static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z
         bool blocked = false;
         vshi_triangles_blocked(triangles, &ray, 1, &blocked);
         const int is = expected(x, z);
-        if (is >= 0) {
-            if (blocked != (is == 1)) {
-                fail_msg("(%g, %g) is %s", x, z, blocked ? "blocked" : "free");
-            }
-            met += blocked;
-            ++asked;
-        }
+        assert_that(is < 0 || blocked == (is == 1), "(%g, %g) is %s", x, z, blocked ? "blocked" : "free");
+        met += is >= 0 && blocked;
+        asked += is >= 0;
     }
     assert_true(asked > 5000 && met > 150);
     vsh_assets_free(assets);
@@ -180,11 +165,6 @@ static void assert_casts(card c, int (*expected)(double x, double z)) {
     expect_shadow(assets, expected);
 }
 
-static void assert_casts_nothing(card c, const char *why) {
-    OWNED(vsh_assets) *assets = NULL;
-    assert_fails(load(c, &assets), VSH_ERROR_INPUT, why);
-}
-
 TEST(a_card_casts_the_disc_in_its_textures_alpha) {
     const bytes png = disc_image(0.0f);
     write_bytes("leaf.png", png.at, png.size);
@@ -196,8 +176,8 @@ TEST(a_card_casts_the_disc_in_its_textures_alpha) {
     free(png.at);
 }
 
-/* What is whole is as any other mesh, and what is clear is not there. */
-TEST(only_what_an_edge_crosses_is_asked_of_the_mask) {
+/* Opaque triangles are a mesh without a mask, and clear ones are left out. */
+TEST(only_triangles_that_an_edge_crosses_keep_the_mask) {
     OWNED(vsh_assets) *assets = NULL;
     assert_ok(load((card){0}, &assets));
     size_t count = 0;
@@ -230,70 +210,55 @@ TEST(wraps_and_texture_transforms_are_those_of_the_file) {
         int (*expected)(double x, double z);
     } cases[] = {{"{\"wrapS\":33648,\"wrapT\":33648}", NULL, 2.0f, mirrored},
                  {NULL, transformed, 1.0f, turned}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         assert_casts(
             (card){.material = cases[i].material, .sampler = cases[i].sampler, .scale = cases[i].scale},
             cases[i].expected);
     }
 }
 
-/* Alpha is 0.4 out of the disc and 1 in it. */
-TEST(cutoff_and_base_factor_decide) {
+#define TEXTURE "\"baseColorTexture\":{\"index\":0}"
+#define BASE(factor, more) "\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1," factor "]" more "}"
+
+/* A texture's alpha is `outside` out of the disc and 1 in it. */
+TEST(mode_cutoff_and_base_factor_decide_what_casts) {
     static const struct {
-        const char *material;
+        const char *material; /* without its name */
+        float outside;
+        bool cast_blended;
         int (*expected)(double x, double z); /* NULL: nothing casts */
     } cases[] = {
-        {"{\"alphaMode\":\"MASK\",\"alphaCutoff\":0.3,\"pbrMetallicRoughness\":{\"baseColorTexture\":{"
-         "\"index\":0}}}",
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":0.3,\"pbrMetallicRoughness\":{" TEXTURE "}", 0.4f, false,
          everywhere},
-        {"{\"alphaMode\":\"MASK\",\"alphaCutoff\":0.35,\"pbrMetallicRoughness\":{\"baseColorFactor\":["
-         "1,1,1,0.5],\"baseColorTexture\":{\"index\":0}}}",
-         by_disc},
-        {"{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.4],"
-         "\"baseColorTexture\":{\"index\":0}}}",
-         NULL},
-        {"{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.4]}}", NULL},
-        {"{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,0.6]}}", everywhere},
-        {"{\"alphaMode\":\"MASK\",\"alphaCutoff\":0}", everywhere}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        const card c = {.material = cases[i].material, .outside = 0.4f};
-        if (cases[i].expected != NULL) {
-            assert_casts(c, cases[i].expected);
-        } else {
-            assert_casts_nothing(c, "leave nothing");
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":0.35," BASE("0.5", "," TEXTURE), 0.4f, false, by_disc},
+        {"\"alphaMode\":\"MASK\"," BASE("0.4", "," TEXTURE), 0.4f, false, NULL},
+        {"\"alphaMode\":\"MASK\"," BASE("0.4", ""), 0.4f, false, NULL},
+        {"\"alphaMode\":\"MASK\"," BASE("0.6", ""), 0.4f, false, everywhere},
+        {"\"alphaMode\":\"MASK\",\"alphaCutoff\":0", 0.4f, false, everywhere},
+        /* blended: cast if they are cut out, or if asked */
+        {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{" TEXTURE "}", 0.0f, false, by_disc},
+        {"\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{" TEXTURE "}", 0.3f, false, NULL},
+        {"\"alphaMode\":\"BLEND\"," BASE("0.3", "," TEXTURE), 0.0f, false, NULL},
+        {"\"alphaMode\":\"BLEND\"," BASE("0.3", "," TEXTURE), 0.0f, true, by_disc},
+        {"\"alphaMode\":\"BLEND\"," BASE("0.3", ""), 0.0f, false, NULL},
+        {"\"alphaMode\":\"BLEND\"," BASE("0.3", ""), 0.0f, true, everywhere}};
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        const bool blended = i >= 6;
+        char material[256];
+        snprintf(material, sizeof material, "{\"name\":\"leaf\",%s}", cases[i].material);
+        const card c = {
+            .material = material, .outside = cases[i].outside, .cast_blended = cases[i].cast_blended};
+        if (cases[i].expected == NULL) {
+            OWNED(vsh_assets) *assets = NULL;
+            assert_fails(load(c, &assets), VSH_ERROR_INPUT, blended ? "blended" : "leave nothing");
+            continue;
         }
+        assert_casts(c, cases[i].expected);
+        assert_int_equal(strstr(warnings, "at least half") != NULL, blended && !c.cast_blended);
     }
 }
 
-TEST(blended_cards_cast_where_they_are_cut_out_and_glass_does_not) {
-    static const char leaf[] = "{\"name\":\"leaf\",\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{"
-                               "\"baseColorTexture\":{\"index\":0}}}";
-    static const char glass[] = "{\"name\":\"glass\",\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{"
-                                "\"baseColorFactor\":[1,1,1,0.3],\"baseColorTexture\":{\"index\":0}}}";
-    static const char plain[] =
-        "{\"alphaMode\":\"BLEND\",\"pbrMetallicRoughness\":{\"baseColorFactor\":[1,1,1,"
-        "0.3]}}";
-    static const struct {
-        const char *material;
-        float outside; /* alpha there */
-        bool cast_blended;
-        int (*expected)(double x, double z);
-    } cases[] = {{leaf, 0.0f, false, by_disc}, {leaf, 0.3f, false, NULL},  {glass, 0.0f, false, NULL},
-                 {glass, 0.0f, true, by_disc}, {plain, 0.0f, false, NULL}, {plain, 0.0f, true, everywhere}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        const card c = {.material = cases[i].material,
-                        .outside = cases[i].outside,
-                        .cast_blended = cases[i].cast_blended};
-        if (cases[i].expected != NULL) {
-            assert_casts(c, cases[i].expected);
-            assert_int_equal(strstr(warnings, "at least half") != NULL, !cases[i].cast_blended);
-        } else {
-            assert_casts_nothing(c, "blended");
-        }
-    }
-}
-
-TEST(textures_that_cannot_be_had_leave_the_card_whole) {
+TEST(textures_that_are_missing_or_damaged_leave_the_card_whole) {
     const bytes png = disc_image(0.0f);
     unsigned char damaged[512];
     memcpy(damaged, png.at, sizeof damaged);
@@ -303,8 +268,8 @@ TEST(textures_that_cannot_be_had_leave_the_card_whole) {
                           {(unsigned char *)(uintptr_t) "no image", 8},
                           {(unsigned char *)(uintptr_t) "\xff\xd8\xff\xe0 nor this", 14},
                           {(unsigned char *)(uintptr_t) "RIFF\1\0\0\0WEBPVP8 ", 16}};
-    for (size_t i = 0; i < 2 * (sizeof none / sizeof none[0] + 1); ++i) {
-        const bool missing = i / 2 == sizeof none / sizeof none[0];
+    for (size_t i = 0; i < 2 * (COUNT_OF(none) + 1); ++i) {
+        const bool missing = i / 2 == COUNT_OF(none);
         FREED char *uri = missing ? strdup("gone.png") : data_uri(none[i / 2]);
         assert_casts((card){.reader = i % 2 != 0, .uri = uri}, everywhere);
         assert_non_null(strstr(warnings, "material 'leaf' casts whole"));
@@ -325,29 +290,6 @@ TEST(a_texture_past_the_memory_limit_is_an_error) {
     assert_fails(load((card){.memory_limit = 4 * TEXELS * TEXELS * sizeof(float) - 1}, &assets),
                  VSH_ERROR_LIMIT, "material 'leaf'");
     assert_null(assets);
-}
-
-TEST(patterns_mean_materials_where_no_object_is_called_so) {
-    static const struct {
-        const char *pattern;
-        bool matches;
-    } cases[] = {{"leaf", true},           {"l*f", true},          {"material:leaf", true}, {"card", true},
-                 {"material:card", false}, {"material:l?", false}, {"leav", false}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
-        static const char unknown[] = "there are 'card', and materials 'leaf'";
-        const char *const pattern[] = {cases[i].pattern};
-        const card one_sided = {.material = "{\"name\":\"leaf\"}", .uri = "x.png", .one_sided = pattern};
-        const card except = {.material = "{\"name\":\"leaf\"}", .uri = "x.png", .except = pattern};
-        assert_casts_nothing(except, cases[i].matches ? "no object is left" : unknown);
-        if (!cases[i].matches) {
-            assert_casts_nothing(one_sided, unknown);
-            continue;
-        }
-        OWNED(vsh_assets) *assets = NULL;
-        size_t count = 0;
-        assert_ok(load(one_sided, &assets));
-        assert_int_equal(vsh_assets_caster(assets, 0, &count)[0].one_sided, 1);
-    }
 }
 
 FIXTURE(make_folder, remove_folder)

@@ -1,7 +1,7 @@
 /* One scene in every format that is read, as Blender 3.4 writes it (tools/export_models.py): the same
  * triangles in the same places. */
+#include "handles.h"
 #include "models.h"
-#include "testing.h"
 
 typedef struct sums {
     size_t triangles;
@@ -30,11 +30,9 @@ static void add_uvs(const vsh_mesh *mesh, double *sum) {
 static sums sums_of(const char *name, double unit) {
     char path[512];
     snprintf(path, sizeof path, "%s/%s", VSH_MODELS, name);
-    OWNED(vsh_model) *model = NULL;
-    assert_ok(vsh_model_read(path, NULL, &model, &failure));
-    if (fabs(vsh_model_unit(model) - unit) > 1e-12) {
-        fail_msg("%s: a unit of %g m, expected %g", name, vsh_model_unit(model), unit);
-    }
+    OWNED(vsh_model) *model = model_from(path);
+    assert_that(fabs(vsh_model_unit(model) - unit) <= 1e-12, "%s: a unit of %g m, expected %g", name,
+                vsh_model_unit(model), unit);
     sums s = {.min = {1e9, 1e9, 1e9}, .max = {-1e9, -1e9, -1e9}};
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
         const vsh_mesh_report report = check(model, i);
@@ -55,9 +53,8 @@ static sums sums_of(const char *name, double unit) {
 }
 
 static void expect(const char *name, const char *what, double value, double expected) {
-    if (!(fabs(value - expected) <= 2e-5 * (1.0 + fabs(expected)))) {
-        fail_msg("%s: %s %.9g, expected %.9g", name, what, value, expected);
-    }
+    assert_that(fabs(value - expected) <= 2e-5 * (1.0 + fabs(expected)), "%s: %s %.9g, expected %.9g", name,
+                what, value, expected);
 }
 
 /* Of the scene: 12 triangles of the box and 4 of the L, and no area over the L's void. */
@@ -79,7 +76,7 @@ TEST(one_scene_is_the_same_in_every_format) {
     expect("scene.glb", "area", truth.area, 30.0);
     expect("scene.glb", "lowest y", truth.min[1], 2.0);
     expect("scene.glb", "area of glass", truth.blended, 4.0);
-    for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(files); ++i) {
         const char *name = files[i].name;
         const sums s = sums_of(name, files[i].unit);
         /* Blender writes PLY and STL with z up: its y is then minus the others' z */

@@ -1,7 +1,7 @@
-/* What a bake says of its error holds against rays to the casters, the field's own share included. */
-#include "casts.h"
-#include "testing.h"
+/* The error that a bake reports, the field's own share included, against rays to the casters. */
+#include "shading.h"
 #include "texels_of.h"
+#include "truth/metrics.h"
 
 enum { WIDTH = 96, HEIGHT = 88, TEXELS = WIDTH * HEIGHT, BARS = 8, CHANNELS = 2 };
 
@@ -12,15 +12,16 @@ typedef struct stage {
     float positions[BARS][24];
     vsh_mesh bars[BARS];
     vsh_field *field;
-    vsh_triangles *triangles;
+    vshi_triangles *triangles;
 } stage;
 
 static const double VOXEL = 0.08;
 
-static void make_bar(stage *s, int i) {
-    const double x = -0.9 + 0.24 * i, half = i == 0 ? 0.2 : 0.02;
-    s->bars[i] = box_mesh(s->positions[i], (double[]){x - half, 0.5 - half, -0.7},
-                          (double[]){x + half, 0.5 + half, 0.7});
+static const double SUN[3] = {0.4, 0.8, 0.3};
+
+static void cast_bars(stage *s, size_t count, double voxel) {
+    s->field = field_of_grid(grid_from_meshes(s->bars, count, voxel), 0.0);
+    s->triangles = triangles_from(s->bars, count);
 }
 
 static int set_up(void **state) {
@@ -33,20 +34,18 @@ static int set_up(void **state) {
         s->floor.positions[3 * v + 2] = 1.5f - 3.0f * s->floor.uvs[2 * v + 1];
     }
     for (int i = 0; i < BARS; ++i) {
-        make_bar(s, i);
+        const double x = -0.9 + 0.24 * i, half = i == 0 ? 0.2 : 0.02;
+        s->bars[i] = box_mesh(s->positions[i], (double[]){x - half, 0.5 - half, -0.7},
+                              (double[]){x + half, 0.5 + half, 0.7});
     }
-    const vsh_grid_options options = with_voxel(VOXEL);
-    OWNED(vsh_grid) *grid = NULL;
-    assert_ok(vsh_grid_from_meshes(s->bars, BARS, &options, NULL, &grid, &failure));
-    assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
-    assert_ok(vsh_triangles_create(s->bars, BARS, NULL, &s->triangles, &failure));
+    cast_bars(s, BARS, VOXEL);
     return 0;
 }
 
 static int tear_down(void **state) {
     FREED stage *s = *state;
-    vsh_triangles_free(s->triangles);
-    vsh_field_free(s->field);
+    vshi_triangles_free(s->triangles);
+    vshi_field_free(s->field);
     return 0;
 }
 
@@ -64,61 +63,48 @@ static vsh_lightmap_options options_of(int32_t method, int32_t ao_method) {
     return options;
 }
 
-static vsh_light sun(void) {
-    vsh_light light = vsh_light_default();
-    light.direction[0] = 0.4;
-    light.direction[1] = 0.8;
-    light.direction[2] = 0.3;
-    light.angle = 0.04;
-    return light;
-}
-
-static baked *bake_whole(const stage *s, vsh_lightmap_options options, int32_t threads,
-                         const vsh_triangles *truth) {
+static baked *bake(const stage *s, vsh_lightmap_options options, const vshi_triangles *truth) {
     baked *b = calloc(1, sizeof *b);
-    OWNED(vsh_charts) *charts = create(&s->floor.mesh, 1, options, NULL);
-    const vsh_light light = sun();
+    OWNED(vsh_charts) *charts = charts_from(&s->floor.mesh, 1, &options);
+    const vsh_light light = sun(SUN, 0.04);
     float *const shadow = b->shadow;
     const vsh_lightmap lightmap = {.shadow = &shadow, .ao = b->ao, .coverage = b->coverage};
-    const vsh_run run = run_on(threads);
     vsh_bake_stats stats = vsh_bake_stats_zero();
     stats.errors = b->errors;
     const int exact = options.shade.method == VSH_SHADOW_EXACT;
     const vsh_occluders casters = {
         .field = s->field, .triangles = exact ? s->triangles : NULL, .true_triangles = truth};
-    assert_ok(vsh_bake_lightmap(&casters, charts, &light, 1, NULL, &run, &lightmap, &stats, &failure));
+    assert_ok(vsh_bake_lightmap(&casters, charts, &light, 1, NULL, NULL, &lightmap, &stats, &failure));
     return b;
 }
 
 /* Root mean square errors of valid texels, against rays of the library's tracer. */
 static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
     enum { RAYS = 256 };
-    const vsh_light light = sun();
-    OWNED(vsh_charts) *charts = create(&s->floor.mesh, 1, options_of(VSH_SHADOW_CONE, VSH_AO_CONES), NULL);
-    OWNED(vsh_texels) *texels = rasterize(charts);
-    const vsh_texel_samples all = vsh_texels_samples(texels);
-    FREED float *truth = malloc(all.count * sizeof *truth);
+    static float truth[CHANNELS][TEXELS], values[CHANNELS][TEXELS], valid[TEXELS];
+    const vsh_light light = sun(SUN, 0.04);
+    const vsh_lightmap_options options = options_of(VSH_SHADOW_CONE, VSH_AO_CONES);
+    OWNED(vsh_charts) *charts = charts_from(&s->floor.mesh, 1, &options);
+    OWNED(vshi_texels) *texels = texels_from(charts);
+    const vshi_texel_samples all = vshi_texels_samples(texels);
+    assert_ok(vshi_trace_shadow(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, &light, RAYS,
+                                NULL, truth[0], &failure));
+    assert_ok(vshi_trace_ao(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, 1.0, RAYS, NULL,
+                            truth[1], &failure));
+    for (size_t i = 0; i < all.count; ++i) {
+        const size_t place = vsh_texel_place(all.texels[i], WIDTH);
+        values[0][i] = b->shadow[place];
+        values[1][i] = b->ao[place];
+        valid[i] = b->coverage[place];
+    }
     for (int c = 0; c < CHANNELS; ++c) {
-        const vsh_result result = c == 0
-                                      ? vsh_trace_shadow(s->triangles, NULL, all.count, all.positions,
-                                                         all.normals, 1e-5, &light, RAYS, NULL, truth, NULL)
-                                      : vsh_trace_ao(s->triangles, NULL, all.count, all.positions,
-                                                     all.normals, 1e-5, 1.0, RAYS, NULL, truth, NULL);
-        assert_ok(result);
-        double sum = 0.0, valid = 0.0;
-        for (size_t i = 0; i < all.count; ++i) {
-            const size_t place = vsh_texel_place(all.texels[i], WIDTH);
-            const double off = (double)(c == 0 ? b->shadow : b->ao)[place] - (double)truth[i];
-            sum += b->coverage[place] > 0.0f ? off * off : 0.0;
-            valid += b->coverage[place] > 0.0f;
-        }
-        rmse[c] = sqrt(sum / valid);
+        rmse[c] = truth_compare(all.count, values[c], truth[c], valid).rmse;
     }
 }
 
-TEST(what_voxels_lose_is_in_the_estimate) {
+TEST(the_estimate_includes_parts_that_voxels_lose) {
     const stage *s = *state;
-    FREED baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, s->triangles);
+    FREED baked *b = bake(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), s->triangles);
     double measured[CHANNELS];
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
@@ -131,9 +117,9 @@ TEST(what_voxels_lose_is_in_the_estimate) {
     }
 }
 
-TEST(exact_values_are_held_against_rays_too) {
+TEST(exact_values_are_compared_with_rays_too) {
     const stage *s = *state;
-    FREED baked *b = bake_whole(s, options_of(VSH_SHADOW_EXACT, VSH_AO_EXACT), 0, s->triangles);
+    FREED baked *b = bake(s, options_of(VSH_SHADOW_EXACT, VSH_AO_EXACT), s->triangles);
     double measured[CHANNELS];
     measure(s, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
@@ -142,28 +128,20 @@ TEST(exact_values_are_held_against_rays_too) {
     }
 }
 
-TEST(without_the_casters_only_rays_are_known) {
+TEST(without_the_casters_only_the_error_of_rays_is_known) {
     const stage *s = *state;
-    FREED baked *b = bake_whole(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), 0, NULL);
+    FREED baked *b = bake(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), NULL);
     assert_true(b->errors[0].held == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
     assert_true(vsh_bake_error_rmse(&b->errors[0]) == sqrt(b->errors[0].square_error / TEXELS));
     assert_true(isnan(vsh_bake_error_rmse(&b->errors[1]))); /* a preview knows nothing of its error */
 }
 
-TEST(to_be_measured_changes_no_value) {
+TEST(measuring_changes_no_value) {
     const stage *s = *state;
     const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
-    FREED baked *plain = bake_whole(s, options, 0, NULL), *held = bake_whole(s, options, 0, s->triangles);
+    FREED baked *plain = bake(s, options, NULL), *held = bake(s, options, s->triangles);
     assert_memory_equal(plain->shadow, held->shadow, sizeof plain->shadow);
     assert_memory_equal(plain->ao, held->ao, sizeof plain->ao);
-}
-
-TEST(any_number_of_threads_finds_the_same) {
-    const stage *s = *state;
-    const vsh_lightmap_options options = options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE);
-    FREED baked *one = bake_whole(s, options, 1, s->triangles),
-                *four = bake_whole(s, options, 4, s->triangles);
-    assert_memory_equal(one, four, sizeof *one);
 }
 
 /* A box just over the floor: large voxels make the texels under it invalid. They are filled from lit texels
@@ -172,13 +150,8 @@ TEST(filled_texels_are_not_in_the_estimate) {
     const stage *s = *state;
     stage low = *s;
     low.bars[0] = box_mesh(low.positions[0], (double[]){-0.7, 0.05, -0.7}, (double[]){0.7, 0.85, 0.7});
-    low.triangles = NULL;
-    const vsh_grid_options voxels = with_voxel(0.2);
-    OWNED(vsh_grid) *grid = NULL;
-    assert_ok(vsh_grid_from_meshes(low.bars, 1, &voxels, NULL, &grid, &failure));
-    assert_ok(vsh_field_create(grid, NULL, NULL, &low.field, &failure));
-    assert_ok(vsh_triangles_create(low.bars, 1, NULL, &low.triangles, &failure));
-    FREED baked *b = bake_whole(&low, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), 0, low.triangles);
+    cast_bars(&low, 1, 0.2);
+    FREED baked *b = bake(&low, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_ADAPTIVE), low.triangles);
     double measured[CHANNELS];
     measure(&low, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
@@ -190,8 +163,8 @@ TEST(filled_texels_are_not_in_the_estimate) {
         assert_true(held > 0.9 * measured[c] && held < 1.1 * measured[c]);
         assert_true(said > 0.9 * measured[c]); /* the noise of AO rays may be larger */
     }
-    vsh_triangles_free(low.triangles);
-    vsh_field_free(low.field);
+    vshi_triangles_free(low.triangles);
+    vshi_field_free(low.field);
 }
 
 FIXTURE(set_up, tear_down)

@@ -1,7 +1,7 @@
-/* glTF by the text of its specification: accessors of every kind, extensions, poses and transforms, each
- * where a reader that is off by a little would give something else; and what is refused. */
+/* glTF by the text of its specification: accessors of every kind, extensions, poses and transforms, with
+ * values that a small mistake would change; and refusals. */
 #include "gltf_maker.h"
-#include "testing.h"
+#include "handles.h"
 
 /* These free the maker. */
 static void refuse_as(maker *m, const char *rest, vsh_result code, const char *part, const char *other) {
@@ -51,7 +51,7 @@ TEST(offsets_of_views_and_accessors_add_up) {
                {"1e300", "count or byteOffset"},
                {"-4", "count or byteOffset"},
                {"9007199254740992", "pass the 52 bytes"}};
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
         m = begin();
         snprintf(m->accessors + strlen(m->accessors), 200,
                  ",{\"bufferView\":0,\"byteOffset\":%s,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}",
@@ -144,7 +144,7 @@ TEST(sparse_parts_replace_elements_by_indices_of_any_unsigned_type) {
                  {1, SPARSE("3", "0", "2", "3"), 1, "its sparse part is wrong"},
                  {1, SPARSE("5", "5121", "2", "3"), 1, "its sparse part is wrong"},
                  {1, SPARSE("3", "5121", "2", "3"), 4, "sparse index 2 of 3 is 4"}};
-    for (size_t t = 0; t < sizeof types / sizeof types[0]; ++t) {
+    for (size_t t = 0; t < COUNT_OF(types); ++t) {
         unsigned char indices[12] = {[0] = 1};
         indices[types[t].size] = 2;
         indices[2 * types[t].size] = types[t].last;
@@ -213,31 +213,26 @@ TEST(vertices_that_are_not_used_take_nothing_of_others_with_them) {
 
 /* --- primitives */
 
-TEST(strips_and_fans_become_triangles_of_one_winding) {
-    static const uint16_t zigzag[4] = {0, 1, 3, 2}, round[4] = {0, 1, 2, 3};
-    for (int mode = 5; mode <= 6; ++mode) {
+TEST(strips_and_fans_become_triangles_of_one_winding_without_degenerate_ones) {
+    static const struct {
+        uint16_t indices[6];
+        int count;
+        const char *rest;
+        size_t triangles;
+    } cases[] = {{{0, 1, 3, 2}, 4, ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5"), 2},
+                 {{0, 1, 2, 3}, 4, ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":6"), 2},
+                 {{0, 1, 2, 2, 2, 3}, 6, ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5"), 1},
+                 /* two corners too many in a list of triangles */
+                 {{0, 1, 2, 2, 2, 3}, 5, ALONE MESH("\"POSITION\":0", ",\"indices\":2"), 1}};
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         maker *m = begin();
-        add(m, mode == 5 ? zigzag : round, 8, "", USHORTS, 4, "SCALAR", "");
-        OWNED(vsh_model) *model =
-            read_made(m, mode == 5 ? ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5")
-                                   : ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":6"));
+        add(m, cases[i].indices, sizeof cases[i].indices, "", USHORTS, cases[i].count, "SCALAR", "");
+        OWNED(vsh_model) *model = read_made(m, cases[i].rest);
         const vsh_mesh_report report = check(model, 0);
-        assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 2);
+        assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, cases[i].triangles);
         assert_int_equal(report.flipped_edges, 0);
-        assert_int_equal(report.open_edges, 4);
-        assert_near(report.area, 1.0, 1e-12);
-    }
-}
-
-TEST(strips_leave_out_what_has_no_area_and_lists_what_is_over) {
-    static const uint16_t strip[6] = {0, 1, 2, 2, 2, 3};
-    for (int mode = 4; mode <= 5; ++mode) {
-        maker *m = begin();
-        add(m, strip, sizeof strip, "", USHORTS, mode == 4 ? 5 : 6, "SCALAR", "");
-        OWNED(vsh_model) *model =
-            read_made(m, mode == 4 ? ALONE MESH("\"POSITION\":0", ",\"indices\":2")
-                                   : ALONE MESH("\"POSITION\":0", ",\"indices\":2,\"mode\":5"));
-        assert_int_equal(vsh_model_mesh(model, 0, 0).triangle_count, 1);
+        assert_int_equal(report.open_edges, cases[i].triangles + 2);
+        assert_near(report.area, 0.5 * (double)cases[i].triangles, 1e-12);
     }
 }
 
@@ -272,7 +267,7 @@ TEST(nodes_stand_by_rotation_matrix_and_scene) {
         /* no scene: what is nobody's child */
         {"\"nodes\":[{\"mesh\":0},{\"children\":[0],\"translation\":[0,3,0]}],", {1, 3, 0}, {1, 4, 0}},
     };
-    for (size_t i = 0; i < sizeof files / sizeof files[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(files); ++i) {
         char rest[1024];
         snprintf(rest, sizeof rest, "%s" MESH("\"POSITION\":0", ""), files[i].rest);
         OWNED(vsh_model) *model = read_made(begin(), rest);
@@ -388,10 +383,10 @@ TEST(nodes_share_a_mesh_but_not_its_pose) {
 TEST(required_extensions_that_are_not_known_are_refused_by_name) {
     static const struct {
         const char *name, *advice;
-    } cases[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "to be seen"},
+    } cases[] = {{"KHR_made_up", "export it without"}, {"KHR_node_visibility", "visible nodes"},
                  {"KHR_mesh_quantization", NULL},      {"KHR_texture_transform", NULL},
                  {"KHR_materials_unlit", NULL},        {"KHR_lights_punctual", NULL}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         char rest[1024];
         snprintf(rest, sizeof rest, "\"extensionsRequired\":[\"%s\"]," ALONE MESH("\"POSITION\":0", ""),
                  cases[i].name);
@@ -403,7 +398,7 @@ TEST(required_extensions_that_are_not_known_are_refused_by_name) {
     }
 }
 
-TEST(a_buffer_that_is_not_there_is_named) {
+TEST(a_missing_buffer_is_named) {
 #define BESIDE(uri)                                                                                          \
     "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":48,\"uri\":\"" uri "\"}]," ALONE MESH(    \
         "\"POSITION\":0",                                                                                    \
@@ -420,7 +415,7 @@ TEST(a_buffer_that_is_not_there_is_named) {
 #undef BESIDE
 }
 
-TEST(what_is_out_of_range_is_refused) {
+TEST(values_out_of_range_are_refused) {
     static const struct {
         const char *rest, *part;
     } bad[] = {
@@ -428,12 +423,12 @@ TEST(what_is_out_of_range_is_refused) {
         {NODE(",\"children\":[9]") MESH("\"POSITION\":0", ""), "names node 9"},
         {NODE(",\"children\":[-1]") MESH("\"POSITION\":0", ""), "names node -1"},
         {NODE(",\"translation\":[0,\"a\",0]") MESH("\"POSITION\":0", ""), "nodes[0]: its transform"},
-        {ALONE MESH("\"POSITION\":0", ",\"mode\":7"), "its mode is none"},
+        {ALONE MESH("\"POSITION\":0", ",\"mode\":7"), "its mode is unknown"},
         {ALONE MESH("\"POSITION\":0", ",\"indices\":2"), "'indices' is 2"},
         {ALONE MESH("\"POSITION\":0", ",\"indices\":-1"), "'indices' is no index"},
         {ALONE MESH("\"POSITION\":0", ",\"indices\":0"), "its indices have 3 components"},
     };
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
         refuse_made(begin(), bad[i].rest, bad[i].part);
     }
     refused("a.gltf", "{\"asset\":{\"version\":\"1.0\"}}", VSH_ERROR_UNSUPPORTED, "is glTF 1.0", "2.0");
@@ -453,7 +448,7 @@ TEST(nodes_deeper_than_the_limit_are_refused) {
     refuse_as(begin(), rest, VSH_ERROR_LIMIT, "deeper than 1024", "");
 }
 
-/* What an accessor claims is held against the limit before memory is taken. */
+/* The size that an accessor claims is compared with the limit before memory is allocated. */
 TEST(claims_of_memory_are_checked) {
     FREED maker *m = begin();
     strcat(m->accessors, ",{\"componentType\":5126,\"count\":4000000000,\"type\":\"VEC3\"}");

@@ -1,10 +1,10 @@
-/* Materials of a glTF: what decides where light comes through masked ones; in the process itself and by a
- * reader, which is this test. */
+/* Materials and lights of a glTF, in the process itself and by a reader, which is this test: where light
+ * comes through masked materials, where lights stand, and what is refused. */
 #define _GNU_SOURCE
 
 #include "gltf_maker.h"
+#include "handles.h"
 #include "served.h"
-#include "testing.h"
 
 /* Five bytes are the image, in buffer view 2. */
 static const unsigned char image[5] = {'I', 'M', 'A', 'G', 'E'};
@@ -36,16 +36,16 @@ static const char textures[] = "\"textures\":[{\"source\":0,\"sampler\":0}],\"sa
 TEST(masked_materials_come_with_their_image) {
     for (int reader = 0; reader < 2; ++reader) {
         OWNED(vsh_model) *model = read_gltf_by(reader != 0, material_json(LEAF(",\"texCoord\":3"), textures));
-        assert_int_equal(vsh_model_material_count(model), 2);
-        assert_int_equal(vsh_model_mesh_material(model, 0), 1);
-        assert_int_equal(vsh_model_mesh_material(model, 1), -1);
-        assert_int_equal(vsh_model_mesh_material(model, 2), 0);
+        assert_int_equal(vshi_model_material_count(model), 2);
+        assert_int_equal(vshi_model_mesh_material(model, 0), 1);
+        assert_int_equal(vshi_model_mesh_material(model, 1), -1);
+        assert_int_equal(vshi_model_mesh_material(model, 2), 0);
         assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, VSH_ALPHA_MASKED);
-        const vsh_model_material plain = vsh_model_get_material(model, 0);
+        const vshi_material plain = vshi_model_get_material(model, 0);
         assert_string_equal(plain.name, "plain");
         assert_true(plain.alpha == VSH_ALPHA_OPAQUE && plain.double_sided == 0 && plain.alpha_cutoff == 0.0);
         assert_null(plain.image);
-        const vsh_model_material leaf = vsh_model_get_material(model, 1);
+        const vshi_material leaf = vshi_model_get_material(model, 1);
         assert_string_equal(leaf.name, "leaf");
         assert_true(leaf.alpha == VSH_ALPHA_MASKED && leaf.double_sided == 1);
         assert_true(leaf.alpha_cutoff == 0.25 && leaf.base_alpha == 0.75);
@@ -56,42 +56,46 @@ TEST(masked_materials_come_with_their_image) {
         assert_null(leaf.image_path);
     }
     OWNED(vsh_model) *model = read_text("a.obj", quad_obj);
-    assert_int_equal(vsh_model_material_count(model), 0);
-    assert_int_equal(vsh_model_mesh_material(model, 0), -1);
+    assert_int_equal(vshi_model_material_count(model), 0);
+    assert_int_equal(vshi_model_mesh_material(model, 0), -1);
 }
 
-static void assert_maps(const vsh_model_material *m, double u, double v, double to_u, double to_v) {
+static void assert_maps(const vshi_material *m, double u, double v, double to_u, double to_v) {
     const double *t = m->uv_transform;
     const double made[2] = {t[0] * u + t[1] * v + t[2], t[3] * u + t[4] * v + t[5]};
-    if (!(fabs(made[0] - to_u) < 1e-12 && fabs(made[1] - to_v) < 1e-12)) {
-        fail_msg("(%g, %g) becomes (%.17g, %.17g), expected (%g, %g)", u, v, made[0], made[1], to_u, to_v);
-    }
+    assert_that(fabs(made[0] - to_u) < 1e-12 && fabs(made[1] - to_v) < 1e-12,
+                "(%g, %g) becomes (%.17g, %.17g), expected (%g, %g)", u, v, made[0], made[1], to_u, to_v);
 }
 
 /* By hand: in the file's UVs (v down) scaled, turned so that u goes the way of -v, moved. */
 TEST(transforms_map_uvs_with_v_up) {
-    vsh_model *model = read_gltf_by(true, material_json(LEAF(""), textures));
-    vsh_model_material leaf = vsh_model_get_material(model, 1);
-    assert_int_equal(leaf.uv_set, 0);
-    assert_maps(&leaf, 0.25, 0.75, 0.25, 0.75);
-    vsh_model_free(model);
-    model =
-        read_gltf_by(true, material_json(LEAF(",\"texCoord\":1,\"extensions\":{\"KHR_texture_transform\":{"
-                                              "\"offset\":[0.5,0.25],\"scale\":[2,4],\"texCoord\":2}}"),
-                                         textures));
-    leaf = vsh_model_get_material(model, 1);
-    assert_int_equal(leaf.uv_set, 2);
-    assert_maps(&leaf, 0.0, 1.0, 0.5, 1.0 - 0.25); /* the file's (0, 0) is at (0.5, 0.25) of it */
-    assert_maps(&leaf, 0.5, 0.75, 1.5, 1.0 - 1.25);
-    vsh_model_free(model);
-    model =
-        read_gltf_by(true, material_json(LEAF(",\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0,1],"
-                                              "\"rotation\":1.5707963267948966,\"scale\":[2,1]}}"),
-                                         textures));
-    leaf = vsh_model_get_material(model, 1);
-    assert_maps(&leaf, 0.25, 1.0, 0.0, 1.0 - (1.0 - 0.5)); /* (0.25, 0) → (0.5, 0) → (0, -0.5) → (0, 0.5) */
-    assert_maps(&leaf, 0.0, 0.75, 0.25, 1.0 - 1.0);        /* (0, 0.25) → (0.25, 0) → (0.25, 1) */
-    vsh_model_free(model);
+    static const struct {
+        const char *texture;
+        int32_t uv_set;
+        double maps[2][4]; /* from u, v to u, v */
+    } cases[] = {
+        {"", 0, {{0.25, 0.75, 0.25, 0.75}, {0, 0, 0, 0}}},
+        {",\"texCoord\":1,\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0.5,0.25],\"scale\":[2,4],"
+         "\"texCoord\":2}}",
+         2,
+         {{0.0, 1.0, 0.5, 1.0 - 0.25},
+          {0.5, 0.75, 1.5, 1.0 - 1.25}}}, /* (0, 0) is at (0.5, 0.25) of the file */
+        /* (0.25, 0) → (0.5, 0) → (0, -0.5) → (0, 0.5); (0, 0.25) → (0.25, 0) → (0.25, 1) */
+        {",\"extensions\":{\"KHR_texture_transform\":{\"offset\":[0,1],\"rotation\":1.5707963267948966,"
+         "\"scale\":[2,1]}}",
+         0,
+         {{0.25, 1.0, 0.0, 1.0 - (1.0 - 0.5)}, {0.0, 0.75, 0.25, 1.0 - 1.0}}}};
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        char material[512];
+        snprintf(material, sizeof material, LEAF("%s"), cases[i].texture);
+        OWNED(vsh_model) *model = read_gltf_by(true, material_json(material, textures));
+        const vshi_material leaf = vshi_model_get_material(model, 1);
+        assert_int_equal(leaf.uv_set, cases[i].uv_set);
+        for (int k = 0; k < 2; ++k) {
+            const double *m = cases[i].maps[k];
+            assert_maps(&leaf, m[0], m[1], m[2], m[3]);
+        }
+    }
 }
 
 #define MOVED(numbers, more) "\"extensions\":{\"KHR_texture_transform\":{" numbers more "}}"
@@ -146,19 +150,17 @@ TEST(uvs_that_a_packer_made_integers_are_what_textures_see) {
         /* no texture, so no transform */
         {"\"name\":\"plain\"", INTEGER, INTEGER, 4096.0, 1.0, 4096.0, 1.0, false},
     };
-    for (size_t i = 0; i < 2 * sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < 2 * COUNT_OF(cases); ++i) {
         const size_t c = i / 2;
         OWNED(vsh_model) *model =
             read_gltf_by(i % 2 != 0, packed_json(cases[c].material, cases[c].one, cases[c].other));
         const double expected[2][2] = {{cases[c].u, cases[c].v}, {cases[c].other_u, cases[c].other_v}};
         for (size_t m = 0; m < 2; ++m) {
             const float *uv = vsh_model_mesh(model, m, 0).uvs + 2;
-            if (fabs((double)uv[0] - expected[m][0]) > 1e-6 || fabs((double)uv[1] - expected[m][1]) > 1e-6) {
-                fail_msg("case %zu, mesh %zu: (%.9g, %.9g)", c, m, (double)uv[0], (double)uv[1]);
-            }
+            assert_that(hypot((double)uv[0] - expected[m][0], (double)uv[1] - expected[m][1]) <= 1e-6,
+                        "case %zu, mesh %zu: (%.9g, %.9g)", c, m, (double)uv[0], (double)uv[1]);
         }
-        const vsh_model_material told = vsh_model_get_material(model, 0);
-        assert_int_equal(told.uv_transform[0] != 1.0, cases[c].left);
+        assert_int_equal(vshi_model_get_material(model, 0).uv_transform[0] != 1.0, cases[c].left);
     }
 }
 
@@ -168,20 +170,20 @@ TEST(images_may_lie_beside_or_in_the_json) {
             reader != 0,
             material_json(LEAF(""), "\"textures\":[{\"extensions\":{\"EXT_texture_webp\":{\"source\":0}}}],"
                                     "\"images\":[{\"uri\":\"my%20leaf.webp\"}]"));
-        vsh_model_material leaf = vsh_model_get_material(model, 1);
+        vshi_material leaf = vshi_model_get_material(model, 1);
         assert_null(leaf.image);
         assert_string_equal(leaf.image_path, path_of("my leaf.webp").text);
         assert_true(leaf.wrap[0] == VSH_WRAP_REPEAT && leaf.wrap[1] == VSH_WRAP_REPEAT);
         OWNED(vsh_model) *within = read_gltf_by(
             reader != 0, material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
                                                  "\"data:image/png;base64,SU1BR0U=\"}]"));
-        leaf = vsh_model_get_material(within, 1);
+        leaf = vshi_model_get_material(within, 1);
         assert_int_equal(leaf.image_size, sizeof image);
         assert_memory_equal(leaf.image, image, sizeof image);
     }
 }
 
-TEST(a_mask_that_cannot_be_had_is_left_out_with_a_warning) {
+TEST(a_mask_that_cannot_be_read_is_left_out_with_a_warning) {
     static const struct {
         const char *rest, *part;
     } bad[] = {
@@ -194,25 +196,25 @@ TEST(a_mask_that_cannot_be_had_is_left_out_with_a_warning) {
         {"\"textures\":[{\"source\":0}],\"images\":[{\"uri\":\"data:;base64,*\"}]", "no base64"},
         {"\"textures\":[{\"source\":0,\"sampler\":0}],\"images\":[{\"bufferView\":2}]", "'sampler' is 0"},
     };
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
         for (int reader = 0; reader < 2; ++reader) {
             OWNED(vsh_model) *model = read_gltf_by(reader != 0, material_json(LEAF(""), bad[i].rest));
-            const vsh_model_material leaf = vsh_model_get_material(model, 1);
+            const vshi_material leaf = vshi_model_get_material(model, 1);
             assert_null(leaf.image);
             assert_null(leaf.image_path);
-            if (strstr(warnings, bad[i].part) == NULL || strstr(warnings, "its mask is ignored") == NULL) {
-                fail_msg("'%s', expected '%s'", warnings, bad[i].part);
-            }
+            assert_that(strstr(warnings, bad[i].part) != NULL &&
+                            strstr(warnings, "its mask is ignored") != NULL,
+                        "'%s', expected '%s'", warnings, bad[i].part);
         }
     }
 }
 
 static void look_at_materials(const vsh_model *model) {
     for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-        assert_true(vsh_model_mesh_material(model, i) < (int32_t)vsh_model_material_count(model));
+        assert_true(vshi_model_mesh_material(model, i) < (int32_t)vshi_model_material_count(model));
     }
-    for (size_t i = 0; i < vsh_model_material_count(model); ++i) {
-        const vsh_model_material m = vsh_model_get_material(model, i);
+    for (size_t i = 0; i < vshi_model_material_count(model); ++i) {
+        const vshi_material m = vshi_model_get_material(model, i);
         assert_in_range(m.uv_set, 0, VSH_MAX_UV_SETS - 1);
         assert_in_range(m.wrap[0], 0, VSH_WRAP_CLAMP);
         assert_in_range(m.alpha, 0, VSH_ALPHA_BLENDED);
@@ -228,13 +230,13 @@ static void write_two_images(void) {
     write_bytes("a.gltf", json, strlen(json));
 }
 
-TEST(what_a_reader_tells_of_materials_is_refused_or_in_range) {
+TEST(damaged_materials_from_a_reader_are_refused_or_in_range) {
     write_two_images();
     tell_wrong("a.gltf", wrong_words, WRONG_WORDS, look_at_materials, 100, 20);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 
-TEST(a_path_that_a_reader_leads_out_of_the_folder_is_refused) {
+TEST(a_path_from_a_reader_that_leaves_the_folder_is_refused) {
     static _Alignas(8) unsigned char bytes[4096];
     write_two_images();
     const size_t size = payload_of("a.gltf", bytes, sizeof bytes);
@@ -247,6 +249,158 @@ TEST(a_path_that_a_reader_leads_out_of_the_folder_is_refused) {
     memcpy(at + sizeof name - sizeof out, out, sizeof out - 1);
     vsh_model *model = NULL;
     assert_fails(decode(bytes, size, "a.gltf", 0, &model, &failure), VSH_ERROR_READ, "its images");
+    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+}
+
+/* --- KHR_lights_punctual */
+
+static const char *lit_json(const char *nodes, const char *lights) {
+    char rest[4096];
+    FREED maker *m = begin();
+    snprintf(rest, sizeof rest,
+             "\"scenes\":[{\"nodes\":[0,1]}],\"nodes\":[{\"mesh\":0},%s],\"extensions\":{"
+             "\"KHR_lights_punctual\":{\"lights\":[%s]}}," MESH("\"POSITION\":0", ""),
+             nodes, lights);
+    return text_of(m, rest);
+}
+
+#define CARRIES(light) "\"extensions\":{\"KHR_lights_punctual\":{\"light\":" light "}}"
+
+static const char nodes[] =
+    /* turned by 90° about y: its -z is -x; three times as large; children 2 and 3 of it */
+    "{\"name\":\"key\",\"translation\":[1,2,3],\"rotation\":[0,0.70710678118654752,0,0.70710678118654752],"
+    "\"scale\":[3,3,3],\"children\":[2,3]," CARRIES("0") "},"
+                                                         "{\"translation\":[0,0,-1]," CARRIES(
+                                                             "1") "},{\"name\":\"a\\nb\"," CARRIES("2") "}";
+static const char lights[] =
+    "{\"type\":\"directional\",\"name\":\"unused\",\"color\":[1,0.5,0.25],\"intensity\":4},"
+    "{\"type\":\"point\",\"name\":\"lamp\",\"range\":7},"
+    "{\"type\":\"spot\",\"spot\":{\"innerConeAngle\":0.125,\"outerConeAngle\":0.5},\"intensity\":2}";
+
+static void assert_vector(const double *given, double x, double y, double z) {
+    assert_near(given[0], x, 1e-6);
+    assert_near(given[1], y, 1e-6);
+    assert_near(given[2], z, 1e-6);
+}
+
+TEST(lights_stand_where_their_nodes_do) {
+    for (int reader = 0; reader < 2; ++reader) {
+        OWNED(vsh_model) *model = read_gltf_by(reader != 0, lit_json(nodes, lights));
+        assert_int_equal(vshi_model_light_count(model), 3);
+        const vshi_model_light sun = vshi_model_get_light(model, 0), lamp = vshi_model_get_light(model, 1);
+        const vshi_model_light spot = vshi_model_get_light(model, 2);
+        assert_string_equal(sun.name, "key");
+        assert_int_equal(sun.type, VSHI_MODEL_LIGHT_DIRECTIONAL);
+        assert_vector(sun.direction, -1, 0, 0);
+        assert_vector(sun.color, 1, 0.5, 0.25);
+        assert_true(sun.intensity == 4.0 && sun.range == 0.0 && sun.outer_angle == 0.0);
+        assert_string_equal(lamp.name, "lamp"); /* its node has none */
+        assert_int_equal(lamp.type, VSHI_MODEL_LIGHT_POINT);
+        assert_vector(lamp.position, 1 - 3, 2, 3); /* a unit in front of it, thrice as large */
+        assert_vector(lamp.direction, 0, 0, 0);
+        assert_vector(lamp.color, 1, 1, 1);
+        assert_true(lamp.intensity == 1.0 && lamp.range == 7.0);
+        assert_string_equal(spot.name, "a?b");
+        assert_int_equal(spot.type, VSHI_MODEL_LIGHT_SPOT);
+        assert_vector(spot.position, 1, 2, 3);
+        assert_vector(spot.direction, -1, 0, 0);
+        assert_true(spot.inner_angle == 0.125 && spot.outer_angle == 0.5 && spot.intensity == 2.0);
+    }
+    OWNED(vsh_model) *model = read_text("a.obj", quad_obj);
+    assert_int_equal(vshi_model_light_count(model), 0);
+}
+
+TEST(lights_of_a_scene_have_names_sizes_and_falloff) {
+    vsh_light *made = NULL;
+    size_t count = 0;
+    OWNED(vsh_model) *model = read_gltf_by(
+        false, lit_json("{\"name\":\"Key light\",\"translation\":[1,2,3],\"children\":[2,3]," CARRIES(
+                            "0") "},"
+                                 "{\"name\":\"Key_light\"," CARRIES("1") "},{" CARRIES("2") "}",
+                        lights));
+    assert_ok(vshi_lights_from_model(model, 0.25, 0.5, 0.01, &made, &count, &failure));
+    assert_int_equal(count, 3);
+    assert_string_equal(made[0].name, "Key_light");
+    assert_string_equal(made[1].name, "Key_light_2");
+    assert_string_equal(made[2].name, "light");
+    assert_int_equal(made[0].type, VSH_LIGHT_DIRECTIONAL);
+    assert_vector(made[0].direction, 0, 0, 1); /* towards it */
+    assert_vector(made[0].color, 4, 2, 1);
+    assert_true(made[0].angle == 0.25 && made[0].falloff == VSH_FALLOFF_NONE);
+    assert_int_equal(made[1].type, VSH_LIGHT_SPHERE);
+    assert_vector(made[1].position, 0.01, 0.02, 0.03); /* metres read as centimetres */
+    assert_true(made[1].radius == 0.5 && made[1].falloff == VSH_FALLOFF_INVERSE_SQUARE);
+    assert_int_equal(made[2].type, VSH_LIGHT_SPOT);
+    assert_vector(made[2].axis, 0, 0, -1);
+    assert_true(made[2].inner_angle == 0.125 && made[2].outer_angle == 0.5);
+    vsh_lights_free(made);
+    static const double bad[][3] = {{4.0, 0.5, 0.0}, {0.1, -1.0, 0.0}, {0.1, 0.0, -1.0}, {0.1, 0.0, 0.0}};
+    for (int i = 0; i < 4; ++i) {
+        assert_fails(vshi_lights_from_model(i < 3 ? model : NULL, bad[i][0], bad[i][1], bad[i][2], &made,
+                                            &count, &failure),
+                     VSH_ERROR_ARGUMENT, "");
+        assert_null(made);
+    }
+}
+
+TEST(wrong_lights_are_refused_by_their_number) {
+    static const struct {
+        const char *light, *part;
+    } bad[] = {
+        {"{\"type\":\"point\",\"intensity\":-1}", "its intensity is -1"},
+        {"{\"type\":\"point\",\"intensity\":\"x\"}", "its intensity is no number"},
+        {"{\"type\":\"point\",\"range\":-2}", "its range is -2"},
+        {"{\"type\":\"point\",\"color\":[1,-1,1]}", "its color is no three numbers"},
+        {"{\"type\":\"point\",\"color\":[1,\"red\"]}", "its color is no three numbers"},
+        {"{\"type\":\"spot\",\"spot\":{\"outerConeAngle\":2}}", "its outerConeAngle is 2"},
+        {"{\"type\":\"spot\",\"spot\":{\"outerConeAngle\":0}}", "its outerConeAngle is 0"},
+        {"{\"type\":\"spot\",\"spot\":{\"innerConeAngle\":1}}",
+         "its innerConeAngle is 1, expected a number of 0 to "
+         "0.785398"},
+    };
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
+        refused("a.gltf", lit_json("{" CARRIES("0") "}", bad[i].light), VSH_ERROR_INPUT, bad[i].part,
+                "lights[0] of KHR_lights_punctual");
+    }
+    static const char *const none[] = {"{" CARRIES("3") "}", "{" CARRIES("-1") "}", "{" CARRIES("{}") "}"};
+    for (int i = 0; i < 3; ++i) {
+        refused("a.gltf", lit_json(none[i], lights), VSH_ERROR_INPUT, "none of the 3", "nodes[1]");
+    }
+}
+
+TEST(lights_without_a_direction_or_of_an_unknown_type_are_left_out_with_a_warning) {
+    static const struct {
+        const char *scale, *light, *warning;
+    } cases[] = {{"[1,1,0]", "{\"type\":\"directional\"}", "the light of nodes[1] is left out"},
+                 {"[1,1,1]", "{\"type\":\"area\"}", "lights[0] of KHR_lights_punctual is left out"},
+                 {"[0,0,0]", "{\"type\":\"point\"}", NULL}}; /* which points nowhere anyway */
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        char node[128];
+        snprintf(node, sizeof node, "{\"scale\":%s," CARRIES("0") "}", cases[i].scale);
+        OWNED(vsh_model) *model = read_text("a.gltf", lit_json(node, cases[i].light));
+        assert_int_equal(vshi_model_light_count(model), cases[i].warning == NULL);
+        assert_true(cases[i].warning == NULL || strstr(warnings, cases[i].warning) != NULL);
+    }
+}
+
+static void look_at_lights(const vsh_model *model) {
+    vsh_light *made = NULL;
+    size_t count;
+    for (size_t i = 0; i < vshi_model_light_count(model); ++i) {
+        const vshi_model_light light = vshi_model_get_light(model, i);
+        assert_in_range(light.type, 0, VSHI_MODEL_LIGHT_SPOT);
+        assert_true(light.inner_angle <= light.outer_angle && light.outer_angle <= 1.5708);
+        assert_true(light.intensity >= 0.0 && isfinite(light.intensity) && light.range >= 0.0);
+    }
+    if (vshi_lights_from_model(model, 0.1, 0.1, 0.0, &made, &count, &failure) == VSH_OK) {
+        vsh_lights_free(made);
+    }
+}
+
+TEST(damaged_lights_from_a_reader_are_refused_or_in_range) {
+    const char *json = lit_json(nodes, lights);
+    write_bytes("a.gltf", json, strlen(json));
+    tell_wrong("a.gltf", wrong_words, WRONG_WORDS, look_at_lights, 200, 20);
     assert_int_equal(unlink(path_of("a.gltf").text), 0);
 }
 

@@ -1,7 +1,7 @@
-/* Buffer views under EXT_meshopt_compression: what meshoptimizer packed comes out again, through filters as
- * near as their bits, and what is damaged is refused. */
+/* Buffer views under EXT_meshopt_compression: they unpack to what meshoptimizer packed, through filters as
+ * near as their bits, and damaged ones are refused. */
 #include "gltf_maker.h"
-#include "testing.h"
+#include "handles.h"
 
 #include <meshoptimizer.h>
 
@@ -29,7 +29,7 @@ typedef struct view {
     unsigned char bytes[PACKED];
 } view;
 
-/* Those of the sheet: positions, normals (where their size is not 0), indices. */
+/* Views of the sheet: positions, normals (none if their size is 0), indices. */
 static view views[3];
 static const char *normal_type = "5120,\"normalized\":true";
 static int index_type = 5123;
@@ -46,7 +46,7 @@ static void pack_sheet(bool triangles, size_t index_size) {
     index_type = index_size == 2 ? 5123 : 5125;
 }
 
-/* The file of the three views. The buffer of what they unpack to has no data. */
+/* The file of the three views. The buffer of the unpacked data is empty. */
 static const char *packed_json(void) {
     static char json[4 * PACKED + 8192], text[2 * PACKED];
     static unsigned char all[3 * PACKED];
@@ -91,7 +91,7 @@ static const char *packed_json(void) {
     return json;
 }
 
-TEST(what_was_packed_comes_out_again) {
+TEST(meshes_come_out_as_they_were_packed) {
     make_sheet();
     for (int k = 0; k < 4; ++k) {
         pack_sheet(k % 2 == 0, k < 2 ? 2 : 4);
@@ -224,49 +224,46 @@ TEST(quaternions_come_out_again) {
     }
 }
 
-static void refused_with(vsh_result code, const char *part) {
-    refused("a.gltf", packed_json(), code, part, "bufferViews[");
-}
-
-TEST(what_compression_cannot_be_is_refused) {
+TEST(bad_compression_is_refused) {
+    enum { KEPT = -1, OLD_VERSION = 0xa1 /* KHR_meshopt_compression's */ };
+    static const struct {
+        int view;
+        const char *mode, *filter;                         /* NULL: as packed */
+        long count, stride, byte_length, first_byte, size; /* KEPT: as packed */
+        vsh_result code;
+        const char *part;
+    } cases[] = {
+        {0, "MESHLETS", NULL, KEPT, KEPT, 0, KEPT, KEPT, VSH_ERROR_UNSUPPORTED, "mode 'MESHLETS'"},
+        {0, NULL, "COLOR", KEPT, KEPT, 0, KEPT, KEPT, VSH_ERROR_UNSUPPORTED, "filter 'COLOR'"},
+        {0, NULL, "OCTAHEDRAL", KEPT, KEPT, 0, KEPT, KEPT, VSH_ERROR_INPUT,
+         "count 576 and byteStride 12, which ATTRIBUTES with filter OCTAHEDRAL"},
+        {2, NULL, "EXPONENTIAL", KEPT, KEPT, 0, KEPT, KEPT, VSH_ERROR_INPUT,
+         "TRIANGLES with filter EXPONENTIAL"},
+        {2, NULL, NULL, CORNERS - 1, KEPT, 0, KEPT, KEPT, VSH_ERROR_INPUT, "count 3173"},
+        {0, NULL, NULL, KEPT, 260, 0, KEPT, KEPT, VSH_ERROR_INPUT, "byteStride 260"},
+        {0, NULL, NULL, KEPT, 0, 12, KEPT, KEPT, VSH_ERROR_INPUT, "byteStride 0"},
+        {0, NULL, NULL, KEPT, KEPT, 12 * VERTICES + 4, KEPT, KEPT, VSH_ERROR_INPUT,
+         "its byteLength is 6916, but it unpacks to 6912 bytes"},
+        {0, NULL, NULL, KEPT, KEPT, 0, OLD_VERSION, KEPT, VSH_ERROR_UNSUPPORTED,
+         "of version 1; up to version 0 is read"},
+        {0, NULL, NULL, KEPT, KEPT, 0, KEPT, 0, VSH_ERROR_INPUT, "damaged: 0 bytes"},
+        {0, NULL, NULL, 4000000000, KEPT, 0, KEPT, KEPT, VSH_ERROR_INPUT, /* 48 GB from some KB */
+         "cannot hold 4000000000 elements of 12 bytes"},
+        {2, NULL, NULL, 2999999997, KEPT, 0, KEPT, KEPT, VSH_ERROR_INPUT, "cannot hold"},
+    };
     make_sheet();
-    pack_sheet(true, 2);
-    views[0].mode = "MESHLETS";
-    refused_with(VSH_ERROR_UNSUPPORTED, "mode 'MESHLETS'");
-    pack_sheet(true, 2);
-    views[0].filter = "COLOR";
-    refused_with(VSH_ERROR_UNSUPPORTED, "filter 'COLOR'");
-    pack_sheet(true, 2);
-    views[0].filter = "OCTAHEDRAL"; /* of elements of 12 bytes */
-    refused_with(VSH_ERROR_INPUT, "count 576 and byteStride 12, which ATTRIBUTES with filter OCTAHEDRAL");
-    pack_sheet(true, 2);
-    views[2].filter = "EXPONENTIAL";
-    refused_with(VSH_ERROR_INPUT, "TRIANGLES with filter EXPONENTIAL");
-    pack_sheet(true, 2);
-    views[2].count = CORNERS - 1;
-    refused_with(VSH_ERROR_INPUT, "count 3173");
-    pack_sheet(true, 2);
-    views[0].stride = 260;
-    refused_with(VSH_ERROR_INPUT, "byteStride 260");
-    pack_sheet(true, 2);
-    views[0].stride = 0;
-    views[0].byte_length = 12;
-    refused_with(VSH_ERROR_INPUT, "byteStride 0");
-    pack_sheet(true, 2);
-    views[0].byte_length = 12 * VERTICES + 4;
-    refused_with(VSH_ERROR_INPUT, "its byteLength is 6916, but it unpacks to 6912 bytes");
-    pack_sheet(true, 2);
-    views[0].bytes[0] = 0xa1; /* KHR_meshopt_compression's */
-    refused_with(VSH_ERROR_UNSUPPORTED, "of version 1; up to version 0 is read");
-    pack_sheet(true, 2);
-    views[0].size = 0;
-    refused_with(VSH_ERROR_INPUT, "damaged: 0 bytes");
-    pack_sheet(true, 2);
-    views[0].count = 4000000000u; /* 48 GB from some KB */
-    refused_with(VSH_ERROR_INPUT, "cannot hold 4000000000 elements of 12 bytes");
-    pack_sheet(true, 2);
-    views[2].count = 2999999997u;
-    refused_with(VSH_ERROR_INPUT, "cannot hold");
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        pack_sheet(true, 2);
+        view *v = &views[cases[i].view];
+        v->mode = cases[i].mode != NULL ? cases[i].mode : v->mode;
+        v->filter = cases[i].filter;
+        v->count = cases[i].count != KEPT ? (size_t)cases[i].count : v->count;
+        v->stride = cases[i].stride != KEPT ? (size_t)cases[i].stride : v->stride;
+        v->size = cases[i].size != KEPT ? (size_t)cases[i].size : v->size;
+        v->byte_length = cases[i].byte_length;
+        v->bytes[0] = cases[i].first_byte != KEPT ? (unsigned char)cases[i].first_byte : v->bytes[0];
+        refused("a.gltf", packed_json(), cases[i].code, cases[i].part, "bufferViews[");
+    }
 }
 
 /* Each byte of it turned in one bit or all, and cut there: an error of a line, or a mesh. */
@@ -299,7 +296,7 @@ TEST(damaged_data_are_refused_or_a_mesh) {
     assert_in_range(read, 10, 100000);
 }
 
-TEST(what_is_unpacked_is_held_against_the_limit) {
+TEST(the_memory_limit_holds_for_unpacked_data) {
     make_sheet();
     memset(positions, 0, sizeof positions); /* packed 60 times as small */
     pack_sheet(true, 2);

@@ -1,13 +1,12 @@
-/* Level sets of meshes, against closed forms: solids, what is open, and meshes that nobody should make. */
+/* Level sets of meshes, against closed forms: solids, open meshes, meshes that nobody should make, and the
+ * band voxel by voxel. */
 #include "grids.h"
+#include "mesh/mesh.h"
 #include "shapes.h"
-#include "testing.h"
 
 static const double VOXEL = 0.05;
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
-
-enum { MANY = 1000000 };
 
 static char warned[4096];
 
@@ -45,19 +44,11 @@ static double ball(const double p[3], double radius) {
     return sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]) - radius;
 }
 
-static double shell_thickness(const vsh_grid *grid) {
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    return info.shell_thickness;
-}
-
 /* Within `bound` voxels of the truth, and of its sign everywhere; inside down to `inside` voxels. Frees the
  * grid. */
-static void assert_is(vsh_grid *grid, truth_fn *truth, double inside, double bound, const char *what) {
-    const double worst = worst_error(grid, truth, inside, 2.95);
-    const size_t wrong = wrong_blocks(grid, truth, 10);
-    assert_less(worst, bound);
-    assert_int_equal(wrong, 0);
+static void assert_is(vsh_grid *grid, truth_fn *truth, double inside, double bound) {
+    assert_less(worst_error(grid, truth, inside, 2.95), bound);
+    assert_int_equal(wrong_blocks(grid, truth, 10), 0);
     vsh_grid_free(grid);
 }
 
@@ -67,14 +58,14 @@ TEST(a_fine_mesh_of_a_sphere_is_the_sphere) {
     FREED shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 254);
     vsh_mesh mesh = shape_mesh(s, "ball");
-    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1, "ball");
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1);
     shape_turn(s, 0);
     mesh.solidity = VSH_SOLIDITY_SOLID;
-    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1, "ball, turned inside out");
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1);
     shape_turn(s, 0);
     shape_turn(s, s->triangles - 2000);
     mesh.solidity = VSH_SOLIDITY_AUTO;
-    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1, "ball with turned faces");
+    assert_is(grid_of(&mesh, 1, with_voxel(0.03)), unit_sphere, 2.95, 0.1);
 }
 
 TEST(a_mesh_far_away_and_mirrored_is_the_same) {
@@ -127,17 +118,17 @@ static double dome_of_sheets(const double p[3]) {
     return fmin(fabs(ball(p, 3.0)) - VOXEL, to_box(p, 1.0));
 }
 
-TEST(a_sky_dome_leaves_what_it_holds_and_one_that_looks_outwards_holds_air) {
+TEST(a_sky_dome_keeps_its_contents_and_one_that_looks_outwards_holds_air) {
     FREED shape *s = shape_new();
     shape_ball(s, ORIGIN, 3.0, -1.0, 1.0, 128);
     const size_t dome = s->triangles;
     shape_box(s, LOW, HIGH, ALL_SIDES);
-    assert_is(grid_of_shape(s, VOXEL), dome_of_sheets, 0.9, 0.1, "dome");
+    assert_is(grid_of_shape(s, VOXEL), dome_of_sheets, 0.9, 0.1);
     shape_turn(s, 0);
     shape_turn(s, dome);
     vsh_grid *grid = grid_of_shape(s, VOXEL);
-    assert_true(shell_thickness(grid) == 0.0);
-    assert_is(grid, dome_and_cube, 0.9, 0.1, "sky dome");
+    assert_true(grid_info(grid).shell_thickness == 0.0);
+    assert_is(grid, dome_and_cube, 0.9, 0.1);
 }
 
 static double house(const double p[3]) {
@@ -146,29 +137,24 @@ static double house(const double p[3]) {
 
 TEST(houses_have_rooms_with_furniture_in_one_mesh_or_many) {
     static const double half[3] = {0.5, 1.0, 2.0}, mirrored[12] = {1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0};
-    for (int split = 0; split < 2; ++split) {
-        shape *s[3];
+    FREED shape *one = shape_new(), *two = shape_new(), *three = shape_new();
+    for (int i = 0; i < 4; ++i) {
+        const int split = i % 2;
+        shape *const parts[3] = {one, split ? two : one, split ? three : one};
         vsh_mesh meshes[3];
-        for (int i = 0; i < 3; ++i) {
-            const double low[3] = {-half[i], -half[i], -half[i]}, high[3] = {half[i], half[i], half[i]};
-            s[i] = i == 0 || split ? shape_new() : s[0];
-            const size_t first = s[i]->triangles;
-            shape_box(s[i], low, high, ALL_SIDES);
-            if (i == 1) {
-                shape_turn(s[i], first);
-            }
-            meshes[i] = shape_mesh(s[i], "part");
+        one->vertices = one->triangles = two->vertices = two->triangles = three->vertices = three->triangles =
+            0;
+        for (int k = 0; k < 3; ++k) {
+            const double low[3] = {-half[k], -half[k], -half[k]}, high[3] = {half[k], half[k], half[k]};
+            const size_t first = parts[k]->triangles;
+            shape_box(parts[k], low, high, ALL_SIDES);
+            shape_turn(parts[k], k == 1 ? first : parts[k]->triangles);
+            meshes[k] = shape_mesh(parts[k], "part");
+            meshes[k].transform = i < 2 ? NULL : mirrored;
         }
-        meshes[0] = shape_mesh(s[0], "house");
-        for (int turned = 0; turned < 2; ++turned) {
-            for (int i = 0; i < 3; ++i) {
-                meshes[i].transform = turned ? mirrored : NULL;
-            }
-            assert_is(grid_of(meshes, split ? 3 : 1, with_voxel(VOXEL)), house, 2.9, 0.05, "house");
-        }
-        for (int i = 0; i < (split ? 3 : 1); ++i) {
-            free(s[i]);
-        }
+        meshes[0].triangle_count = one->triangles;
+        meshes[0].vertex_count = one->vertices;
+        assert_is(grid_of(meshes, split ? 3 : 1, with_voxel(VOXEL)), house, 2.9, 0.05);
     }
 }
 
@@ -182,9 +168,9 @@ TEST(an_inverted_mesh_is_a_room_or_the_same_solid_if_asked) {
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
     vsh_mesh mesh = shape_mesh(s, "cube");
-    assert_is(grid_of(&mesh, 1, with_voxel(VOXEL)), room, 0.9, 0.02, "room");
+    assert_is(grid_of(&mesh, 1, with_voxel(VOXEL)), room, 0.9, 0.02);
     mesh.solidity = VSH_SOLIDITY_SOLID;
-    assert_is(grid_of(&mesh, 1, with_voxel(VOXEL)), unit_cube, 2.9, 0.02, "solid");
+    assert_is(grid_of(&mesh, 1, with_voxel(VOXEL)), unit_cube, 2.9, 0.02);
 }
 
 TEST(the_door_of_a_room_stays_open) {
@@ -192,7 +178,7 @@ TEST(the_door_of_a_room_stays_open) {
     shape_box(s, LOW, HIGH, ALL_SIDES & ~FRONT);
     shape_turn(s, 0);
     OWNED(vsh_grid) *grid = grid_of_shape(s, VOXEL);
-    assert_true(shell_thickness(grid) == 0.0);
+    assert_true(grid_info(grid).shell_thickness == 0.0);
     FREED_BY(free_leaves) leaves all = leaves_of(grid);
     size_t compared = 0;
     for (size_t n = 0; n < 512 * all.count; ++n) {
@@ -212,23 +198,21 @@ static double room_of_sheets(const double p[3]) {
 }
 
 TEST(rooms_of_separate_walls_hold_air) {
-    shape *s[6];
-    vsh_mesh meshes[6];
+    FREED shape *s = shape_new();
+    vsh_mesh walls[6];
     for (int i = 0; i < 6; ++i) {
-        s[i] = shape_new();
-        shape_box(s[i], LOW, HIGH, 1U << i);
-        meshes[i] = shape_mesh(s[i], "wall");
+        const size_t first = s->triangles;
+        shape_box(s, LOW, HIGH, 1U << i);
+        walls[i] = shape_mesh(s, "wall");
+        walls[i].indices += 3 * first;
+        walls[i].triangle_count -= first;
     }
-    vsh_grid *grid = grid_of(meshes, 6, with_voxel(VOXEL));
-    assert_true(shell_thickness(grid) > 0.0);
-    assert_is(grid, room_of_sheets, 0.9, 0.1, "six walls");
-    shape_box(s[0], LOW, HIGH, ALL_SIDES & ~LEFT);
-    meshes[0] = shape_mesh(s[0], "box");
-    meshes[0].solidity = VSH_SOLIDITY_SHELL;
-    assert_is(grid_of(meshes, 1, with_voxel(VOXEL)), room_of_sheets, 0.9, 0.1, "a box that is to be a shell");
-    for (int i = 0; i < 6; ++i) {
-        free(s[i]);
-    }
+    vsh_grid *grid = grid_of(walls, 6, with_voxel(VOXEL));
+    assert_true(grid_info(grid).shell_thickness > 0.0);
+    assert_is(grid, room_of_sheets, 0.9, 0.1);
+    vsh_mesh box = shape_mesh(s, "box");
+    box.solidity = VSH_SOLIDITY_SHELL;
+    assert_is(grid_of(&box, 1, with_voxel(VOXEL)), room_of_sheets, 0.9, 0.1);
 }
 
 /* --- what is open */
@@ -245,7 +229,7 @@ TEST(an_open_quad_becomes_a_shell_with_a_warning) {
     options.shell_thickness = 4.0;
     OWNED(vsh_grid) *grid = grid_of(&quad, 1, options);
     assert_warned_once("note: mesh 'sail' (1 of 1): 4 open edges: baked as a shell 4 voxels");
-    assert_near(shell_thickness(grid), 0.08, 1e-12);
+    assert_near(grid_info(grid).shell_thickness, 0.08, 1e-12);
     FREED_BY(free_leaves) leaves all = leaves_of(grid);
     for (size_t n = 0; n < 512 * all.count; ++n) {
         double p[3];
@@ -260,21 +244,20 @@ static double capped_ball(const double p[3]) { /* without what is above 0.9 */
     return fmax(ball(p, 1.0), p[2] - 0.9);
 }
 
-TEST(a_solid_with_holes_is_as_deep_as_without_and_told) {
+TEST(a_solid_with_holes_is_as_deep_as_without_and_reported) {
     FREED shape *s = shape_new();
     shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 128);
-    s->indices[1500][1] = s->indices[1500][0];
-    for (int i = -1; i < 4; ++i) { /* a hole of one triangle; then another one, of four */
-        if (i >= 0) {
+    static const char *const told[] = {"3 open edges around 1 hole in 1 of 1 component", "around 2 holes"};
+    s->indices[1500][1] = s->indices[1500][0]; /* a hole of one triangle; then another one, of four */
+    for (int holes = 1; holes <= 2; ++holes) {
+        for (int i = 0; holes == 2 && i < 4; ++i) {
             s->indices[6000 + i][1] = s->indices[6000 + i][0];
         }
-        if (i == -1 || i == 3) {
-            vsh_grid *grid = grid_of_shape(s, VOXEL);
-            assert_true(shell_thickness(grid) == 0.0);
-            assert_warned_once(i < 0 ? "3 open edges around 1 hole in 1 of 1 component" : "around 2 holes");
-            assert_warned_once("closed over the holes");
-            assert_is(grid, unit_sphere, 2.9, 0.1, "ball with holes");
-        }
+        vsh_grid *grid = grid_of_shape(s, VOXEL);
+        assert_true(grid_info(grid).shell_thickness == 0.0);
+        assert_warned_once(told[holes - 1]);
+        assert_warned_once("closed over the holes");
+        assert_is(grid, unit_sphere, 2.9, 0.1);
     }
     s->vertices = s->triangles = 0;
     shape_ball(s, ORIGIN, 1.0, -1.0, 0.9, 128);
@@ -295,50 +278,36 @@ TEST(a_card_in_a_solid_s_mesh_leaves_it_solid) {
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_box(s, low, high, TOP);
     vsh_grid *grid = grid_of_shape(s, VOXEL);
-    assert_true(shell_thickness(grid) > 0.0);
-    assert_is(grid, mixed, 0.9, 0.05, "box and card");
+    assert_true(grid_info(grid).shell_thickness > 0.0);
+    assert_is(grid, mixed, 0.9, 0.05);
 }
 
 /* --- meshes that nobody should make */
 
-TEST(faces_given_twice_or_one_of_them_change_nothing) {
-    uint32_t twice[72];
+TEST(duplicate_faces_and_triangles_without_area_change_nothing) {
+    static const uint32_t degenerate[6] = {3, 3, 3, 0, 1, 0};
+    static const size_t counts[] = {13, 24, 26};
+    uint32_t indices[78];
     vsh_mesh mesh = cube();
-    memcpy(twice, mesh.indices, sizeof twice / 2);
-    memcpy(twice + 36, mesh.indices, sizeof twice / 2);
-    mesh.indices = twice;
-    for (mesh.triangle_count = 13; mesh.triangle_count <= 24; mesh.triangle_count += 11) {
-        assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02, "cube given twice");
+    memcpy(indices, mesh.indices, 36 * sizeof *indices);
+    memcpy(indices + 36, mesh.indices, 36 * sizeof *indices);
+    memcpy(indices + 72, degenerate, sizeof degenerate);
+    mesh.indices = indices;
+    for (int i = 0; i < 3; ++i) {
+        mesh.triangle_count = counts[i];
+        assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02);
     }
 }
 
-TEST(faces_that_disagree_are_told_and_are_the_same_solid) {
+TEST(faces_that_disagree_are_reported_and_make_the_same_solid) {
     uint32_t some_turned[36];
     vsh_mesh mesh = cube();
     for (size_t i = 0; i < 36; ++i) {
         some_turned[i] = mesh.indices[i % 9 == 1 ? i + 1 : i % 9 == 2 ? i - 1 : i];
     }
     mesh.indices = some_turned;
-    assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02, "cube with turned faces");
+    assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02);
     assert_non_null(strstr(warned, "4 triangles that face the other way"));
-}
-
-TEST(a_million_triangles_without_area_change_nothing) {
-    FREED uint32_t *indices = calloc(MANY * 3 + 36, sizeof *indices);
-    assert_non_null(indices);
-    vsh_mesh mesh = cube();
-    memcpy(indices, mesh.indices, 36 * sizeof *indices);
-    for (size_t t = 0; t < MANY; ++t) { /* points, and edges there and back */
-        const uint32_t a = (uint32_t)t % 8;
-        memcpy(indices + 36 + 3 * t, (uint32_t[3]){a, a, t % 2 != 0 ? a : (a + 1) % 8}, sizeof(uint32_t[3]));
-    }
-    mesh.indices = indices;
-    mesh.triangle_count += MANY;
-    vsh_mesh_report report;
-    assert_ok(vsh_mesh_check(&mesh, &report, &failure));
-    assert_int_equal(report.degenerate_triangles, MANY);
-    assert_int_equal(report.open_edges, 0);
-    assert_is(grid_of(&mesh, 1, with_voxel(0.1)), unit_cube, 2.9, 0.02, "cube and degenerate triangles");
 }
 
 /* --- what is refused */
@@ -357,8 +326,7 @@ TEST(bad_meshes_are_refused_with_the_reason) {
     assert_refused(mesh, with_voxel(1e-9), 0, VSH_ERROR_LIMIT, "voxel size 1e-09");
     assert_refused(mesh, with_voxel(2e-5), 0, VSH_ERROR_LIMIT, "this machine's memory");
     assert_refused(mesh, defaults, 1000000, VSH_ERROR_LIMIT, "limit of 1 MB");
-    const uint32_t beyond[3] = {0, 1, 8};
-    mesh.indices = beyond;
+    mesh.indices = (const uint32_t[3]){0, 1, 8};
     mesh.triangle_count = 1;
     assert_refused(mesh, defaults, 0, VSH_ERROR_INPUT, "there are only 8");
     mesh.triangle_count = 0;
@@ -375,7 +343,7 @@ TEST(vertices_out_of_the_world_are_refused) {
                  {NAN, VSH_ERROR_INPUT},   {INFINITY, VSH_ERROR_INPUT}, {-INFINITY, VSH_ERROR_INPUT}};
     const vsh_grid_options resolved = vsh_grid_options_default();
     float bad[24];
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         for (size_t v = 0; v < 24; v += 7) {
             vsh_mesh mesh = box_mesh(bad, LOW, HIGH);
             bad[v] = cases[i].value;
@@ -392,41 +360,249 @@ TEST(vertices_out_of_the_world_are_refused) {
     assert_refused(mesh, resolved, 0, VSH_ERROR_LIMIT, "voxel size");
 }
 
-typedef struct countdown {
-    int32_t left;
-    double last;
-} countdown;
+/* --- the band, voxel by voxel: distances against every triangle, sides against counted crossings */
 
-static int32_t count_down(void *user, const char *stage, double fraction) {
-    countdown *c = user;
-    assert_string_equal(stage, "voxelize");
-    assert_true(fraction >= c->last && fraction <= 1.0);
-    c->last = fraction;
-    return --c->left < 0;
+#define ERROR_MOST 1e-3 /* voxels */
+
+static double to_segment(vshi_vec p, vshi_vec a, vshi_vec b) {
+    const vshi_vec ab = vshi_sub(b, a), ap = vshi_sub(p, a);
+    const double length = vshi_dot(ab, ab);
+    const double t = length > 0.0 ? fmin(fmax(vshi_dot(ap, ab) / length, 0.0), 1.0) : 0.0;
+    return vshi_length(vshi_sub(ap, vshi_scale(ab, t)));
 }
 
-/* Sorting triangles, filling from outside and cutting where solids overlap all ask. */
-TEST(solids_that_overlap_can_be_cancelled_whenever_progress_is_told) {
-    FREED shape *s = shape_new();
-    shape_ball(s, ORIGIN, 1.0, -1.0, 1.0, 200);
-    const vsh_mesh meshes[] = {shape_mesh(s, "ball"), cube()};
-    const vsh_grid_options options = with_voxel(0.2);
-    enum { LAST = 60 }; /* calls, which are those of this stage */
-    int32_t all = INT32_MAX;
-    for (int i = 0; i <= LAST; i += i < 2 ? 1 : 5) {
-        countdown c = {.left = i == 0 ? INT32_MAX : all - i};
-        vsh_run run = run_watched(count_down, &c);
-        run.threads = 1;
-        OWNED(vsh_grid) *grid = NULL;
-        const vsh_result result = vsh_grid_from_meshes(meshes, 2, &options, &run, &grid, &failure);
-        if (i == 0) {
-            all -= c.left;
-            assert_true(all > LAST);
-        }
-        if (i > 1) { /* the last call says that all is done */
-            assert_int_equal(result, VSH_ERROR_CANCELLED);
-            assert_int_equal(c.left, -1); /* and nobody asks again */
-        }
-        assert_true((grid == NULL) == (result == VSH_ERROR_CANCELLED));
+/* Solves for the foot of p on the plane; if that is outside the triangle, an edge is the nearest. */
+static double to_triangle(vshi_vec p, const vshi_vec corner[3]) {
+    const vshi_vec u = vshi_sub(corner[1], corner[0]), v = vshi_sub(corner[2], corner[0]),
+                   w = vshi_sub(p, corner[0]), normal = vshi_cross(u, v);
+    const double area = vshi_dot(normal, normal), b = vshi_dot(vshi_cross(u, w), normal),
+                 c = vshi_dot(vshi_cross(w, v), normal);
+    if (area > 0.0 && b >= 0.0 && c >= 0.0 && b + c <= area) {
+        return fabs(vshi_dot(w, normal)) / sqrt(area);
     }
+    return fmin(to_segment(p, corner[0], corner[1]),
+                fmin(to_segment(p, corner[1], corner[2]), to_segment(p, corner[2], corner[0])));
+}
+
+static double to_shape(const double p[3], const shape *s) {
+    const vsh_mesh mesh = shape_mesh(s, "shape");
+    double least = DBL_MAX;
+    for (size_t i = 0; i < s->triangles; ++i) {
+        vshi_vec corner[3];
+        vshi_mesh_triangle(&mesh, i, corner);
+        least = fmin(least, to_triangle(vshi_vec_of(p), corner));
+    }
+    return least;
+}
+
+/* Whether a ray from p crosses an odd number of triangles. */
+static int is_inside(const double p[3], const shape *s) {
+    const vshi_vec direction = {0.331662, 0.712317, 0.618583};
+    const vsh_mesh mesh = shape_mesh(s, "shape");
+    int odd = 0;
+    for (size_t i = 0; i < s->triangles; ++i) {
+        vshi_vec corner[3];
+        vshi_mesh_triangle(&mesh, i, corner);
+        const vshi_vec u = vshi_sub(corner[1], corner[0]), v = vshi_sub(corner[2], corner[0]),
+                       w = vshi_sub(vshi_vec_of(p), corner[0]), wu = vshi_cross(w, u),
+                       dv = vshi_cross(direction, v);
+        const double scale = 1.0 / vshi_dot(u, dv), a = scale * vshi_dot(w, dv),
+                     b = scale * vshi_dot(direction, wu);
+        odd ^= a >= 0.0 && b >= 0.0 && a + b <= 1.0 && scale * vshi_dot(v, wu) > 0.0;
+    }
+    return odd;
+}
+
+/* A closed surface with bumps and hollows. It has no folds narrower than a voxel, which hold no voxel and
+ * would be closed. */
+static shape *bumpy(int rows, double amplitude) {
+    shape *s = shape_new();
+    const int columns = 2 * rows;
+    for (int row = 0; row <= rows; ++row) {
+        for (int column = 0; column < (row == 0 || row == rows ? 1 : columns); ++column) {
+            const double polar = 3.14159265358979 * row / rows, around = 3.14159265358979 * column / rows;
+            const double x = sin(polar) * cos(around), y = cos(polar), z = sin(polar) * sin(around);
+            const double r = 1.0 + amplitude * (sin(7.0 * x + 3.0 * y) + sin(9.0 * y + 2.0 * z) +
+                                                sin(11.0 * z + 5.0 * x) + 0.5 * sin(31.0 * x * y + 23.0 * z));
+            shape_vertex(s, r * x, r * y, r * z);
+        }
+    }
+    const uint32_t last = (uint32_t)s->vertices - 1;
+    for (int row = 0; row < rows; ++row) {
+        for (int column = 0; column < columns; ++column) {
+            const int next = (column + 1) % columns;
+            const uint32_t up = (uint32_t)(1 + (row - 1) * columns), down = (uint32_t)(1 + row * columns);
+            if (row > 0) {
+                shape_triangle(s, up + (uint32_t)column, up + (uint32_t)next,
+                               row == rows - 1 ? last : down + (uint32_t)column);
+            }
+            if (row < rows - 1) {
+                shape_triangle(s, row == 0 ? 0 : up + (uint32_t)next, down + (uint32_t)next,
+                               down + (uint32_t)column);
+            }
+        }
+    }
+    return s;
+}
+
+static vsh_grid *band_of(const shape *s, double voxel, double half_width, int32_t solidity) {
+    vsh_mesh mesh = shape_mesh(s, "mesh");
+    mesh.solidity = solidity;
+    vsh_grid_options options = with_voxel(voxel);
+    options.half_width = half_width;
+    return grid_of(&mesh, 1, options);
+}
+
+/* Some `count` voxels of all leaves, against the triangles. Voxels farther than the half width have it. */
+static void compare(const shape *s, const vsh_grid *grid, size_t count) {
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
+    const double voxel = all.info.voxel_size;
+    const size_t step = all.count * 512 / count | 1;
+    double worst = 0.0;
+    size_t wrong = 0, near = 0;
+    for (size_t i = 0; i < all.count * 512; i += step) {
+        double p[3];
+        const double value = value_at(&all, i, p) / voxel;
+        const double truth = fmin(to_shape(p, s) / voxel, all.info.half_width);
+        worst = fmax(worst, fabs(fabs(value) - truth));
+        wrong += truth > ERROR_MOST && (value < 0.0) != is_inside(p, s);
+        near += truth < all.info.half_width;
+    }
+    assert_true(near > count / 4);
+    assert_less(worst, ERROR_MOST);
+    assert_int_equal(wrong, 0);
+}
+
+TEST(distances_are_to_the_nearest_triangle_and_sides_by_crossings) {
+    const struct {
+        int rows;
+        double amplitude, voxel, half_width;
+    } cases[] = {
+        {6, 0.02, 0.02, 3.0},  /* triangles of many voxels */
+        {24, 0.05, 0.03, 3.0}, /* of some */
+        {70, 0.06, 0.06, 3.0}, /* of less than one */
+        {40, 0.08, 0.06, 3.0}, /* with folds */
+        {24, 0.05, 0.05, 20.0} /* a wide band */
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        FREED shape *s = bumpy(cases[i].rows, cases[i].amplitude);
+        OWNED(vsh_grid) *grid = band_of(s, cases[i].voxel, cases[i].half_width, VSH_SOLIDITY_SOLID);
+        compare(s, grid, 1500);
+    }
+}
+
+/* A box whose faces are fans of needles around a point near one of their edges. */
+static shape *needles(void) {
+    enum { ACROSS = 400 };
+    shape *s = shape_new();
+    for (int face = 0; face < 6; ++face) {
+        const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+        const uint32_t first = (uint32_t)s->vertices;
+        for (int i = 0; i <= 4 * ACROSS; ++i) {
+            const int side = i / ACROSS % 4;
+            const double t = -1.0 + 2.0 * (i % ACROSS) / ACROSS;
+            const double along[4][2] = {{t, -1.0}, {1.0, t}, {-t, 1.0}, {-1.0, -t}};
+            double p[3];
+            p[axis] = face % 2 == 0 ? -1.0 : 1.0;
+            p[u] = i == 4 * ACROSS ? 0.3 : along[side][0];
+            p[v] = i == 4 * ACROSS ? -0.9999 : along[side][1];
+            shape_vertex(s, p[0], p[1], p[2]);
+        }
+        for (uint32_t i = 0; i < 4 * ACROSS; ++i) {
+            shape_triangle(s, first + i, first + (i + 1) % (4 * ACROSS), first + 4 * ACROSS);
+        }
+    }
+    return s;
+}
+
+TEST(needles_are_as_exact_as_others) {
+    FREED shape *s = needles();
+    const double voxels[] = {0.031, 0.11, 0.007};
+    for (size_t i = 0; i < COUNT_OF(voxels); ++i) {
+        OWNED(vsh_grid) *grid = band_of(s, voxels[i], 3.0, VSH_SOLIDITY_SOLID);
+        assert_less(worst_error(grid, unit_cube, 2.99, 2.99), ERROR_MOST);
+    }
+}
+
+/* Needles alone in space, as sheets, along the voxels' middles: beyond their ends is nothing. */
+TEST(a_lone_needle_ends_where_it_ends) {
+    const double heights[] = {1e-1, 1e-3, 1e-5, 1e-6}; /* voxels */
+    const double voxel = 1.0 / 128.0;
+    for (size_t k = 0; k < COUNT_OF(heights); ++k) {
+        FREED shape *s = shape_new();
+        const double height = heights[k] * voxel;
+        shape_triangle(s, shape_vertex(s, -0.3125, -0.3125, 0.0), shape_vertex(s, 0.3125, 0.3125, 0.0),
+                       shape_vertex(s, 0.01 - height, 0.01 + height, 0.0));
+        OWNED(vsh_grid) *grid = band_of(s, voxel, 3.0, VSH_SOLIDITY_SHELL);
+        FREED_BY(free_leaves) leaves all = leaves_of(grid);
+        const double background = all.info.half_width * voxel, half = 0.5 * all.info.shell_thickness;
+        double worst = 0.0;
+        for (size_t i = 0; i < all.count * 512; ++i) {
+            double p[3];
+            const double value = value_at(&all, i, p);
+            const double truth = fmin(fmax(to_shape(p, s) - half, -background), background);
+            worst = fmax(worst, fabs(value - truth) / voxel);
+        }
+        assert_less(worst, ERROR_MOST);
+    }
+}
+
+typedef struct bounds {
+    double low[3], high[3];
+} bounds;
+
+static int is_in_box(const double p[3], const bounds *b, double by) {
+    int in = 1;
+    for (int i = 0; i < 3; ++i) {
+        in &= p[i] > b->low[i] + by && p[i] < b->high[i] - by;
+    }
+    return in;
+}
+
+/* The distance to the part of a box's faces outside the other box, by points `step` apart. */
+static double to_faces(const double p[3], const bounds *b, const bounds *other, double step) {
+    double least = DBL_MAX;
+    for (int face = 0; face < 6; ++face) {
+        const int axis = face / 2, u = (axis + 1) % 3, v = (axis + 2) % 3;
+        double q[3];
+        q[axis] = face % 2 == 0 ? b->low[axis] : b->high[axis];
+        for (q[u] = b->low[u]; q[u] <= b->high[u] + 1e-9; q[u] += step) {
+            for (q[v] = b->low[v]; q[v] <= b->high[v] + 1e-9; q[v] += step) {
+                const double length = vshi_length(vshi_sub(vshi_vec_of(p), vshi_vec_of(q)));
+                least = length < least && !is_in_box(q, other, -1e-9) ? length : least;
+            }
+        }
+    }
+    return least;
+}
+
+/* Depth in a union is to its own surface, wherever its parts have theirs; within two voxels of where those
+ * cross, it may be less. */
+TEST(depth_is_to_the_surface_of_the_union) {
+    const bounds boxes[2] = {{{-1.03, -0.5, -0.5}, {1.01, 0.52, 0.5}},
+                             {{-0.4, -0.31, -0.33}, {0.42, 1.23, 0.3}}};
+    const double voxel = 0.05, step = 0.01;
+    FREED shape *s = shape_new();
+    shape_box(s, boxes[0].low, boxes[0].high, ALL_SIDES);
+    shape_box(s, boxes[1].low, boxes[1].high, ALL_SIDES);
+    OWNED(vsh_grid) *grid = band_of(s, voxel, 6.0, VSH_SOLIDITY_SOLID);
+    FREED_BY(free_leaves) leaves all = leaves_of(grid);
+    double deeper = 0.0, shallower = 0.0;
+    size_t compared = 0;
+    for (size_t i = 0; i < all.count * 512; i += 7) {
+        double p[3];
+        const double depth = -value_at(&all, i, p) / voxel;
+        if (!is_in_box(p, &boxes[0], voxel) && !is_in_box(p, &boxes[1], voxel)) {
+            continue;
+        }
+        const double truth = fmin(
+            fmin(to_faces(p, &boxes[0], &boxes[1], step), to_faces(p, &boxes[1], &boxes[0], step)) / voxel,
+            all.info.half_width);
+        deeper = fmax(deeper, depth - truth);
+        shallower = fmax(shallower, truth - depth);
+        ++compared;
+    }
+    assert_true(compared > 500);
+    assert_less(deeper, 0.05);
+    assert_less(shallower, 2.0);
 }

@@ -1,19 +1,19 @@
-/* Heightfields as meshes and as images, and what is wrong with some. */
+/* Heightfields as meshes, as images and as they are marched; they and spheres as layers, and texels within
+ * them. */
 #include "images.h"
 #include "terrain.h"
-#include "testing.h"
 
-#include "base/isa.h"
+#include "base/job.h"
 #include "base/vec.h"
+#include "field/field.h"
 #include "heightfield/heights.h"
 #include "mesh/solidity.h"
-#include "previews.h"
+#include "scene/scene.h"
 #include "trace/embree.h"
 #include "trace/terrain.h"
-
+#include "traced.h"
 #include <vdbshade/occluders.h>
 #include <vdbshade/scene.h>
-#include <vdbshade/settings.h>
 
 enum { SIDE = 65 };
 
@@ -24,10 +24,8 @@ TEST(a_solid_is_closed_wound_outwards_and_of_its_volume) {
     OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     vsh_mesh_report report;
-    assert_int_equal(vsh_mesh_check(&mesh, &report, NULL), VSH_OK);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 0);
-    assert_int_equal(report.degenerate_triangles, 0);
+    assert_ok(vsh_mesh_check(&mesh, &report, &failure));
+    assert_true(report.open_edges == 0 && report.flipped_edges == 0 && report.degenerate_triangles == 0);
     double volume = 0.0, lowest = INFINITY;
     for (size_t t = 0; t < mesh.triangle_count; ++t) {
         vshi_vec c[3];
@@ -80,11 +78,10 @@ TEST(a_surface_keeps_the_heights_beside_each_texel_s_middle) {
     FREED float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
     const vsh_run run = vsh_run_default();
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const size_t texels[2] = {cases[i].texels, 8};
         OWNED(vsh_model) *model = NULL;
-        assert_int_equal(vshi_model_of_heights(&source, VSH_HEIGHTS_SURFACE, texels, &run, &model, NULL),
-                         VSH_OK);
+        assert_ok(vshi_model_of_heights(&source, VSH_HEIGHTS_SURFACE, texels, &run, &model, &failure));
         const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
         vshi_terrain grid;
         assert_true(vshi_mesh_is_terrain(&mesh, &grid));
@@ -102,7 +99,7 @@ TEST(a_surface_keeps_the_heights_beside_each_texel_s_middle) {
     }
 }
 
-static int stop_at_once(void *user, const char *stage, double fraction) {
+static int32_t stop(void *user, const char *stage, double fraction) {
     return 1;
 }
 
@@ -123,12 +120,10 @@ TEST(a_band_that_would_take_minutes_is_refused_and_the_one_it_names_is_not) {
     assert_non_null(most);
     /* cancelled as soon as it begins */
     options.half_width = atof(most + strlen("use at most "));
-    vsh_run run = vsh_run_default();
-    run.progress = stop_at_once;
+    const vsh_run run = run_watched(stop, NULL);
     assert_fails(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure), VSH_ERROR_CANCELLED, "");
     options.half_width = 12.0;
-    run.progress = NULL;
-    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, &run, &grid, &failure));
+    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, NULL, &grid, &failure));
 }
 
 TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
@@ -149,9 +144,7 @@ TEST(the_field_of_a_heightfield_holds_distances_not_gaps) {
     for (int i = 0; i < 40; ++i) {
         const double gap = -0.6 + 1.2 * i / 39.0, x = -1.0 + i * 0.05;
         const double position[3] = {x, 2.0 * (x + 2.0) + gap, 0.1};
-        float distance = 0.0f;
-        vsh_field_sample(field, 1, position, &distance);
-        assert_float_equal(distance, gap / sqrt(5.0), 0.01);
+        assert_near((double)distance_at(field, position), gap / sqrt(5.0), 0.01);
     }
 }
 
@@ -184,18 +177,14 @@ TEST(a_terrain_is_solid_or_open_as_its_triangles_are) {
         vshi_solidity *found[2];
         const vshi_component *c[2];
         for (int k = 0; k < 2; ++k) {
-            size_t count;
             assert_int_equal(vshi_solidity_create(&meshes[k], 1, &run, &found[k], NULL), VSH_OK);
-            c[k] = vshi_solidity_components(found[k], &count);
-            assert_int_equal(count, 1);
+            assert_int_equal(found[k]->count, 1);
+            c[k] = found[k]->components;
         }
-        assert_int_equal(c[0]->kind, c[1]->kind);
         assert_int_equal(c[0]->kind, i % 2 == 0 ? VSHI_KIND_SOLID : VSHI_KIND_SHEET);
-        assert_int_equal(c[0]->vessel, c[1]->vessel);
-        assert_int_equal(c[0]->triangles, c[1]->triangles);
-        assert_int_equal(c[0]->turned, c[1]->turned);
-        assert_int_equal(c[0]->open_edges, c[1]->open_edges);
-        assert_int_equal(c[0]->holes, c[1]->holes);
+        assert_true(c[0]->kind == c[1]->kind && c[0]->vessel == c[1]->vessel);
+        assert_true(c[0]->triangles == c[1]->triangles && c[0]->turned == c[1]->turned);
+        assert_true(c[0]->open_edges == c[1]->open_edges && c[0]->holes == c[1]->holes);
         assert_true(c[0]->area == c[1]->area);
         assert_true(fabs(c[0]->volume - c[1]->volume) <= 1e-9 * c[0]->area);
         assert_memory_equal(vshi_solidity_sides(found[0], 0), vshi_solidity_sides(found[1], 0),
@@ -210,14 +199,8 @@ static double random_part(uint32_t *state) {
     return (double)(*state >> 8) / 16777216.0;
 }
 
-static vsh_triangles *make_triangles(const vsh_mesh *mesh) {
-    vsh_triangles *triangles = NULL;
-    assert_int_equal(vsh_triangles_create(mesh, 1, NULL, &triangles, NULL), VSH_OK);
-    return triangles;
-}
-
 /* From anywhere to anywhere, some upright, some along the grid. */
-static vshi_segment_ray random_ray(const vsh_triangles *of, int number, uint32_t *seed) {
+static vshi_segment_ray random_ray(const vshi_triangles *of, int number, uint32_t *seed) {
     double low[3], high[3], square = 0.0;
     vshi_triangles_bounds(of, low, high);
     vshi_segment_ray ray = {.far = number % 3 == 0 ? INFINITY : 0.0};
@@ -245,19 +228,19 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
     OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     FREED uint32_t *indices = malloc(8 * ROWS * COLUMNS * sizeof *indices);
     assert_non_null(indices);
-    for (size_t i = 0; i < sizeof transforms / sizeof transforms[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(transforms); ++i) {
         vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
         mesh.transform = transforms[i];
         const vsh_mesh other = reindexed(&mesh, indices);
-        OWNED(vsh_triangles) *terrain = make_triangles(&mesh), *triangles = make_triangles(&other);
-        assert_less(vsh_triangles_bytes(terrain), vsh_triangles_bytes(triangles) / 4);
+        OWNED(vshi_triangles) *terrain = triangles_from(&mesh, 1), *triangles = triangles_from(&other, 1);
+        assert_less(vshi_triangles_bytes(terrain), vshi_triangles_bytes(triangles) / 4);
         uint32_t seed = (uint32_t)i;
         int apart[4] = {0};
         for (int k = 0; k < RAYS; ++k) {
             const vshi_segment_ray ray = random_ray(triangles, k, &seed);
             bool blocked[2], backs[2];
             uint8_t meets[2];
-            vsh_triangles *const both[2] = {terrain, triangles};
+            vshi_triangles *const both[2] = {terrain, triangles};
             for (int b = 0; b < 2; ++b) {
                 vshi_triangles_blocked(both[b], &ray, 1, &blocked[b]);
                 vshi_triangles_meet_backs(both[b], &ray, 1, &backs[b]);
@@ -297,7 +280,7 @@ TEST(every_instruction_set_finds_the_same_crossings) {
     FREED_BY(vshi_relief_free) vshi_relief relief;
     assert_true(vshi_mesh_is_terrain(&mesh, &grid));
     const double centre[3] = {0.0, 0.0, 0.0};
-    assert_int_equal(vshi_relief_create(&mesh, grid, centre, 1.0, &relief, NULL), VSH_OK);
+    assert_ok(vshi_relief_create(&mesh, grid, centre, 1.0, &relief, &failure));
     uint32_t seed = 7;
     int crossed = 0;
     for (int i = 0; i < 2000; ++i) {
@@ -311,8 +294,8 @@ TEST(every_instruction_set_finds_the_same_crossings) {
             vshi_terrain_aim(&relief, origin, direction, 0.0, lane % 3 == 0 ? 5.0 : INFINITY, lane, &rays);
         }
         float first[VSHI_TERRAIN_LANES];
-        for (size_t k = 0; k < sizeof sets / sizeof sets[0]; ++k) {
-            if (vshi_isa_check(sets[k].isa, NULL) != VSH_OK) {
+        for (size_t k = 0; k < COUNT_OF(sets); ++k) {
+            if (vshi_isa_available(sets[k].isa) == 0) {
                 continue;
             }
             sets[k].kernel(&relief, &rays);
@@ -326,7 +309,7 @@ TEST(every_instruction_set_finds_the_same_crossings) {
     assert_true(crossed > 500);
 }
 
-static vsh_caster caster_of(const char *path, double width, double depth, double height) {
+static vsh_caster terrain_caster(const char *path, double width, double depth, double height) {
     vsh_caster caster = vsh_caster_default();
     caster.type = VSH_CASTER_HEIGHTFIELD;
     caster.path = path;
@@ -338,7 +321,7 @@ static vsh_caster caster_of(const char *path, double width, double depth, double
 
 /* A scene of one heightfield caster over an image in the tests' folder. */
 static vsh_result load(const char *path, vsh_assets **assets, vsh_error *error) {
-    vsh_caster caster = caster_of(path, 3.0, 2.0, 4.0);
+    vsh_caster caster = terrain_caster(path, 3.0, 2.0, 4.0);
     vsh_scene scene = vsh_scene_default();
     scene.casters = &caster;
     scene.caster_count = 1;
@@ -365,9 +348,9 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
         for (int i = 0; i < SIDE * SIDE; ++i) {
             values[i] = smooth_hill(hill, i % SIDE, i / SIDE);
         }
-        const float *views[1] = {values};
-        static const char *const names[] = {"Y"};
-        const vsh_image image = {SIDE, SIDE, 1, names, views, NULL};
+        const float *const view = values;
+        static const char *const name = "Y";
+        const vsh_image image = {SIDE, SIDE, 1, &name, &view, NULL};
         vsh_image_options write = vsh_image_options_default();
         write.bits = 32;
         assert_ok(vsh_image_write(at("hill.exr"), &image, &write, &failure));
@@ -380,7 +363,7 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
         }
         truth_mesh *rays = truth_mesh_create(&mesh, 1);
         for (int direct = 0; rays != NULL && direct < 2; ++direct) {
-            vsh_caster caster = caster_of(at("hill.exr"), 10.0, 10.0, 2.0);
+            vsh_caster caster = terrain_caster(at("hill.exr"), 10.0, 10.0, 2.0);
             caster.direct = direct;
             vsh_scene scene = vsh_scene_default();
             scene.casters = &caster;
@@ -399,12 +382,8 @@ TEST(no_point_of_eight_smooth_hills_is_off_by_a_tenth_from_rays_by_default) {
             truth_mesh_light(rays, points.count, positions, normals, towards, tan(RADIANS(2.0)), RAYS, 0,
                              truth[0]);
             truth_mesh_ao(rays, points.count, positions, normals, 1.0, RAYS, 0, truth[1]);
-            double worst = 0.0;
-            for (size_t i = 0; i < points.count; ++i) {
-                worst = fmax(worst, fabs((double)shadow[i] - (double)truth[0][i]));
-                worst = fmax(worst, fabs((double)ao[i] - (double)truth[1][i]));
-            }
-            assert_less(worst, 0.1);
+            assert_less(truth_compare(points.count, shadow, truth[0], NULL).max, 0.1);
+            assert_less(truth_compare(points.count, ao, truth[1], NULL).max, 0.1);
         }
         truth_mesh_free(rays);
     }
@@ -426,7 +405,7 @@ TEST(images_of_8_16_and_32_bits_are_read) {
         {"rgb.png", 16, 3, 4.0 / 131070.0 + 1e-5, 1.0f},
     };
     static const char *const rgb[] = {"R", "G", "B"}, *const grey[] = {"Y"};
-    for (size_t k = 0; k < sizeof cases / sizeof cases[0]; ++k) {
+    for (size_t k = 0; k < COUNT_OF(cases); ++k) {
         const bool color = cases[k].channels == 3;
         float planes[3][12];
         const float *const views[3] = {planes[0], planes[1], planes[2]};
@@ -461,7 +440,7 @@ TEST(bad_images_are_refused_with_their_place) {
                  {"huge.exr", 3e38f, 3, "row 1, column 3"}, /* finite, but not four times that */
                  {"line.exr", 0.0f, 1, "4 × 1 pixels"}};
     vsh_assets *assets = NULL;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         static const char *const names[] = {"Y"};
         const float values[12] = {[7] = cases[i].value}, *const views[1] = {values};
         const vsh_image image = {4, cases[i].height, 1, names, views, NULL};
@@ -495,7 +474,7 @@ TEST(bad_sources_are_refused) {
         {2, 2, {1, 1}, 1, 1, NULL, NULL, "values is NULL"},
         {2, 2, {1, 1}, 1, 1, values, shear, "transform must be finite and neither shear"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const vsh_heights_source source = {.columns = cases[i].columns,
                                            .rows = cases[i].rows,
                                            .values = cases[i].values,
@@ -504,9 +483,9 @@ TEST(bad_sources_are_refused) {
                                            .base = cases[i].base,
                                            .transform = cases[i].transform};
         const vsh_result code = source.values == nan ? VSH_ERROR_INPUT : VSH_ERROR_ARGUMENT;
-        vsh_heights *heights = NULL;
+        vshi_heights *heights = NULL;
         vsh_model *model = NULL;
-        assert_fails(vsh_heights_create(&source, NULL, &heights, &failure), code, cases[i].message);
+        assert_fails(vshi_heights_create(&source, NULL, &heights, &failure), code, cases[i].message);
         assert_null(heights);
         if (cases[i].transform == NULL) { /* a mesh may be sheared */
             assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure), code,
@@ -516,20 +495,240 @@ TEST(bad_sources_are_refused) {
     }
 }
 
-TEST(memory_limits_hold_before_memory_is_taken) {
+TEST(the_memory_limit_is_the_memory_of_heights) {
     FREED float *values = hills(SIDE, SIDE);
     const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
-    vsh_run run = run_within(3 * SIDE * SIDE);
-    OWNED(vsh_heights) *heights = NULL;
-    vsh_model *model = NULL;
-    assert_fails(vsh_heights_create(&source, &run, &heights, &failure), VSH_ERROR_LIMIT, "");
-    assert_fails(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, &run, &model, &failure), VSH_ERROR_LIMIT,
-                 "");
-    run.memory_limit = 5 * SIDE * SIDE;
-    assert_ok(vsh_heights_create(&source, &run, &heights, &failure));
-    vsh_heights_info info;
-    vsh_heights_get_info(heights, &info);
-    assert_at_most(info.bytes, run.memory_limit);
+    OWNED(vshi_heights) *heights = NULL;
+    for (int enough = 0; enough < 2; ++enough) {
+        const vsh_run run = run_within((enough ? 5 : 3) * SIDE * SIDE);
+        assert_fails(vshi_heights_create(&source, &run, &heights, &failure),
+                     enough ? VSH_OK : VSH_ERROR_LIMIT, "");
+    }
+    vshi_heights_info info;
+    vshi_heights_get_info(heights, &info);
+    assert_at_most(info.bytes, 5 * SIDE * SIDE);
+}
+
+/* --- heightfields that are marched as they are, by the methods hard and classic */
+
+enum { WIDE = 129, POINTS = 3000 };
+
+typedef struct stage {
+    float *values;
+    vshi_heights *heights;
+    vsh_model *model;
+    truth_mesh *truth;
+    double positions[3 * POINTS];
+    float normals[3 * POINTS];
+} stage;
+
+/* Hills, and points on triangles of their top, which the first are. */
+static stage set_up(const double *transform) {
+    stage s = {.values = hills(WIDE, WIDE)};
+    vsh_heights_source source = source_of(s.values, WIDE, WIDE, 10.0, 2.0);
+    source.transform = transform;
+    s.heights = heights_of(&source);
+    s.model = model_of(&source, VSH_HEIGHTS_SOLID);
+    const vsh_mesh mesh = vsh_model_mesh(s.model, 0, -1);
+    s.truth = truth_mesh_create(&mesh, 1);
+    uint64_t counter = 1;
+    for (size_t i = 0; i < POINTS; ++i) {
+        const size_t face = (size_t)between(&counter, 0.0, 2.0 * (WIDE - 1) * (WIDE - 1) - 0.001);
+        const double b = uniform(&counter), c = uniform(&counter);
+        const bool over = b + c > 1.0;
+        stand_on(&mesh, face, over ? 1.0 - b : b, over ? 1.0 - c : c, i, s.positions, s.normals);
+    }
+    return s;
+}
+
+static void tear_down(stage *s) {
+    truth_mesh_free(s->truth);
+    vsh_model_free(s->model);
+    vshi_heights_free(s->heights);
+    free(s->values);
+}
+
+static void shadow(const stage *s, const vsh_light *light, int32_t method, float *values) {
+    const vsh_points points = {POINTS, s->positions, NULL, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    vshi_heights_shadow(s->heights, light, method, &points, 0, POINTS, 0.0, values, &stats);
+    assert_true(stats.samples > 0);
+}
+
+TEST(a_hard_march_is_the_ray_but_for_ridges_narrower_than_its_step) {
+    /* turned, mirrored, three times as large */
+    static const double transform[12] = {0, 0, -3, 100, 0, 3, 0, -40, -3, 0, 0, 7};
+    static const double directions[][3] = {
+        {-0.9, 0.2, 0.35}, {0.3, 0.6, -0.7}, {0.05, 1.0, 0.02}, {-0.9, -0.05, 0.35}};
+    for (int turned = 0; turned < 2; ++turned) {
+        FREED_BY(tear_down) stage s = set_up(turned ? transform : NULL);
+        for (size_t d = 0; d < COUNT_OF(directions); ++d) {
+            const vsh_light light = sun(directions[d], RADIANS(3.0));
+            static float values[POINTS], truth[POINTS];
+            shadow(&s, &light, VSH_SHADOW_HARD, values);
+            truth_mesh_light(s.truth, POINTS, s.positions, NULL, directions[d], 0.0, 1, 0, truth);
+            size_t differ = 0;
+            for (size_t i = 0; i < POINTS; ++i) {
+                differ += values[i] != truth[i];
+            }
+            assert_at_most(differ, POINTS / 50);
+        }
+    }
+}
+
+/* A plateau of height 4 from x = 0 on, seen from the ground before it: h / (w t) is least at its edge, or
+ * where the ray leaves the terrain's height. */
+TEST(a_classic_march_is_the_least_height_over_the_cone_s_width) {
+    float plateau[65 * 9];
+    for (int i = 0; i < 65 * 9; ++i) {
+        plateau[i] = i % 65 >= 32 ? 1.0f : 0.0f;
+    }
+    const vsh_heights_source source = {
+        .columns = 65, .rows = 9, .values = plateau, .size = {64, 8}, .height = 4, .base = 1};
+    OWNED(vshi_heights) *heights = heights_of(&source);
+    static const double towards[3] = {1.0, 0.5, 0.0};
+    const double w = 0.2;
+    const vsh_light light = sun(towards, 2.0 * atan(w));
+    for (int i = 0; i < 29; ++i) {
+        const double x = -30.0 + i, position[3] = {x, 0.0, 0.0}, unit = sqrt(1.25);
+        /* how high the ray is at the edge, and how far that is along it */
+        const double gap = -0.5 * x - 4.0, far = -x * unit, expected = fmin(fmax(gap / (w * far), 0.0), 1.0);
+        const vsh_points points = {1, position, NULL, NULL};
+        vsh_shade_stats stats = vsh_shade_stats_zero();
+        float value[2];
+        vshi_heights_shadow(heights, &light, VSH_SHADOW_CLASSIC, &points, 0, 1, 0.0, &value[0], &stats);
+        vshi_heights_shadow(heights, &light, VSH_SHADOW_HARD, &points, 0, 1, 0.0, &value[1], &stats);
+        if (fabs(gap) > 0.01) {
+            assert_float_equal(value[1], gap > 0.0 ? 1.0 : 0.0, 1e-6);
+        }
+        assert_float_equal(value[0], expected, 0.1); /* it steps over the edge */
+    }
+}
+
+TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
+    FREED_BY(tear_down) stage s = set_up(NULL);
+    const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, -0.3, 0, 0, 5, 0};
+    const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
+    static const double up[3] = {0, 1, 0};
+    const vsh_light light = sun(up, 0.1);
+    const vsh_points points = {4, positions, normals, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    float values[3];
+    for (size_t begin = 0; begin < 2; ++begin) { /* results begin at 0 whatever the first point */
+        vshi_heights_shadow(s.heights, &light, VSH_SHADOW_CLASSIC, &points, begin, begin + 3, 0.0, values,
+                            &stats);
+        assert_true(isnan(values[1 - begin]));
+        assert_true(values[2 - begin] == 0.0f);
+        assert_true(begin == 0 ? isnan(values[0]) : values[2] == 1.0f);
+    }
+}
+
+/* --- terrains and spheres as layers of a field, and from scene files to lightmaps */
+
+static vsh_field *empty_field(void) {
+    vsh_field *field = NULL;
+    assert_ok(vshi_field_create_empty(1e-5, &field, &failure));
+    return field;
+}
+
+enum { MANY = 1000 };
+
+TEST(a_layer_of_heights_is_marched_by_hard_and_classic_alone) {
+    static double positions[3 * MANY];
+    static float normals[3 * MANY], values[MANY], other[MANY];
+    FREED float *samples = hills(SIDE, SIDE);
+    const vsh_heights_source source = source_of(samples, SIDE, SIDE, 10.0, 1.5);
+    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
+    OWNED(vshi_heights) *heights = heights_of(&source);
+    OWNED(vsh_field) *empty = empty_field();
+    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    uint64_t counter = 2;
+    for (size_t i = 0; i < MANY; ++i) {
+        const size_t face = (size_t)between(&counter, 0.0, 2.0 * (SIDE - 1) * (SIDE - 1) - 0.01);
+        stand_on(&mesh, face, 1.0 / 3.0, 1.0 / 3.0, i, positions, normals);
+    }
+    vshi_layer layer = vshi_layer_default();
+    layer.heights = heights;
+    static const double towards[3] = {-0.8, 0.3, 0.4};
+    const vsh_light light = sun(towards, RADIANS(30.0));
+    const vsh_occluders *const casters = occluders_with(empty, &layer, 1);
+    const vsh_shade_options options = preview_options();
+    const vsh_points points = {MANY, positions, normals, NULL};
+    for (layer.method = 0; layer.method <= VSH_SHADOW_AUTO; ++layer.method) {
+        const bool marched = layer.method == VSH_SHADOW_HARD || layer.method == VSH_SHADOW_CLASSIC;
+        assert_fails(vsh_shade_shadow(casters, &points, &light, &options, NULL, values, NULL, NULL, &failure),
+                     marched ? VSH_OK : VSH_ERROR_ARGUMENT,
+                     "layer 0: heights and spheres are shaded by the methods hard and classic");
+    }
+    /* another light's layer casts nothing, and heights have no AO by themselves */
+    static const char *const lamp_name[] = {"lamp"};
+    layer.method = VSH_SHADOW_HARD;
+    layer.lights = lamp_name;
+    layer.light_count = 1;
+    shadows_by(casters, &light, VSH_SHADOW_CONE, MANY, positions, normals, values);
+    shadows(empty, &light, VSH_SHADOW_CONE, MANY, positions, normals, other);
+    assert_memory_equal(values, other, sizeof values);
+    assert_ok(vsh_shade_ao(casters, &points, &options, NULL, values, NULL, NULL, NULL, &failure));
+    for (size_t i = 0; i < MANY; ++i) {
+        assert_true(values[i] == 1.0f);
+    }
+}
+
+/* Bakes the floor under casters given as JSON; coverage of its texels. */
+static void bake_floor(const char *casters, float *shadow, float *coverage, int32_t side) {
+    char text[1024];
+    snprintf(text, sizeof text,
+             "{\"casters\":[%s],\"method\":\"hard\",\"lights\":[{\"name\":\"sun\",\"type\":\"directional\","
+             "\"direction\":[0,1,0]}],"
+             "\"receivers\":[{\"mesh\":\"seeds_floor.obj\",\"output\":\"none.exr\"}]}",
+             casters);
+    OWNED(vsh_scene) *scene = NULL;
+    OWNED(vsh_assets) *assets = NULL;
+    assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &failure));
+    assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
+    vshi_layer layer = vshi_layer_default();
+    layer.heights = vshi_assets_heights(assets, 0);
+    layer.spheres = vshi_assets_spheres(assets, 0);
+    layer.method = VSH_SHADOW_HARD;
+    vsh_shade_options shade = preview_options();
+    vsh_lightmap_options options = preview_lightmap_options();
+    options.width = options.height = side;
+    options.padding = 0;
+    size_t count = 0;
+    const vsh_mesh *meshes = vsh_assets_receiver(assets, 0, &count);
+    OWNED(vsh_charts) *texels = charts_from(meshes, count, &options);
+    static const double high[3] = {0.0, 1.0, 0.0};
+    const vsh_light light = sun(high, 0.1);
+    float *const planes[1] = {shadow};
+    vsh_lightmap lightmap = {.shadow = planes, .coverage = coverage};
+    OWNED(vsh_field) *empty = empty_field();
+    assert_ok(vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap,
+                                NULL, &failure));
+}
+
+TEST(texels_within_a_sphere_or_a_terrain_are_not_valid) {
+    enum { TEXELS = 64 };
+    static float shadow[TEXELS * TEXELS], coverage[TEXELS * TEXELS];
+    /* a ball through the floor: its section is a disc of radius 1 of the floor's 5 × 5 */
+    bake_floor("{\"spheres\":[[0,0.75,0,1.25]]}", shadow, coverage, TEXELS);
+    size_t invalid = 0, dark = 0;
+    for (size_t i = 0; i < TEXELS * TEXELS; ++i) {
+        invalid += coverage[i] == 0.0f;
+        dark += coverage[i] == 1.0f && shadow[i] == 0.0f;
+    }
+    const double texel = 25.0 / (TEXELS * TEXELS);
+    assert_less(fabs((double)invalid * texel - PI), 0.1);
+    /* under the middle of the sun a ball's hard shadow is as wide as the ball */
+    assert_less(fabs((double)(dark + invalid) * texel - PI * 1.25 * 1.25), 0.05);
+    /* a terrain that is higher than the floor all over one side of it */
+    bake_floor("{\"heightfield\":\"terrain.png\",\"size\":[5,20],\"height\":1,\"direct\":true,"
+               "\"transform\":{\"translate\":[2.5,-0.05,0]}}",
+               shadow, coverage, TEXELS);
+    double covered = 0.0;
+    for (size_t i = 0; i < TEXELS * TEXELS; ++i) {
+        covered += (double)coverage[i];
+    }
+    assert_true(covered > 0.4 * TEXELS * TEXELS && covered < 0.6 * TEXELS * TEXELS);
 }
 
 FIXTURE(make_folder, remove_folder)

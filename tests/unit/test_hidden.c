@@ -1,9 +1,9 @@
 /* Charts hidden where surfaces touch: vsh_lightmap_fill_hidden(). */
+#include "handles.h"
 #include "seams.h"
-#include "testing.h"
 
-/* Three squares of the plane z = 0 in a row, each a chart of 12 texels: the middle one is hidden. Beside the
- * first, in the lightmap, stands a fourth that is far away in the world. */
+/* Three squares of the plane z = 0 in a row, each a chart of 12 texels: the middle one is hidden. A fourth
+ * is near the first in the lightmap, and far away in the world. */
 enum { SEEN, HIDDEN_CHART, ACROSS, FAR, CHARTS, CHART_TEXELS = 12 };
 
 static const double corners[CHARTS][2] = {{4, 20}, {24, 20}, {44, 20}, {24, 37}};
@@ -47,7 +47,7 @@ static stage begin_with(charts_mesh *mesh, int32_t padding, bool half) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = SIDE;
     options.padding = padding;
-    assert_ok(vsh_charts_create(&mesh->mesh, 1, &options, NULL, NULL, &s.charts, &failure));
+    s.charts = charts_from(&mesh->mesh, 1, &options);
     for (size_t i = 0; i < TEXELS; ++i) {
         int column, row;
         const int chart = chart_at(i, &column, &row);
@@ -73,20 +73,18 @@ static void end(stage *s) {
 
 static uint64_t fill(const stage *s, int32_t threads) {
     const vsh_lightmap map = {.ao = s->ao, .coverage = s->coverage, .irradiance = s->light};
-    vsh_run run = vsh_run_default();
+    const vsh_run run = run_on(threads);
     uint64_t filled = UINT64_MAX;
-    run.threads = threads;
     assert_ok(vsh_lightmap_fill_hidden(s->charts, &map, 0, &run, &filled, &failure));
     return filled;
 }
 
 static void assert_value(const stage *s, size_t texel, float expected) {
-    if (s->ao[texel] != expected) {
-        fail_msg("texel %zu: %g, expected %g", texel, (double)s->ao[texel], (double)expected);
-    }
+    assert_that(s->ao[texel] == expected, "texel %zu: %g, expected %g", texel, (double)s->ao[texel],
+                (double)expected);
 }
 
-TEST(a_hidden_chart_takes_the_nearest_values_of_the_world) {
+TEST(a_hidden_chart_gets_the_nearest_values_of_the_world) {
     FREED_BY(end) stage s = begin(2, false);
     assert_int_equal(fill(&s, 1), CHART_TEXELS * CHART_TEXELS);
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -105,7 +103,7 @@ TEST(a_hidden_chart_takes_the_nearest_values_of_the_world) {
     }
 }
 
-TEST(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest) {
+TEST(empty_texels_are_padded_from_the_nearest_chart) {
     for (int32_t padding = 0; padding <= 6; padding += 2) {
         FREED_BY(end) stage s = begin(padding, false);
         fill(&s, 1);
@@ -127,7 +125,7 @@ TEST(what_is_empty_around_it_is_padded_as_far_as_it_is_the_nearest) {
     }
 }
 
-TEST(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen) {
+TEST(a_chart_in_part_hidden_keeps_its_own_values_near_seen_texels) {
     FREED_BY(end) stage s = begin(2, true);
     int column, row;
     for (size_t i = 0; i < TEXELS; ++i) { /* as the bake fills them */
@@ -147,7 +145,7 @@ TEST(a_chart_in_part_hidden_keeps_its_own_values_near_what_is_seen) {
 }
 
 /* The square that is across lies over the hidden one from its fifth column on. */
-TEST(what_lookups_beside_the_seen_read_is_its_own) {
+TEST(lookups_beside_seen_texels_read_the_charts_own_values) {
     charts_mesh *m = new_mesh();
     static const double places[CHARTS] = {0.0, 1.0, 1.0 + 4.0 / CHART_TEXELS, 40.0};
     for (int c = 0; c < CHARTS; ++c) {
@@ -185,18 +183,21 @@ TEST(threads_change_nothing_nor_do_calls_that_fail) {
     FREED_BY(end) stage s = begin(2, false), other = begin(2, false);
     fill(&s, 1);
     const vsh_lightmap map = {.ao = other.ao, .coverage = other.coverage}, none = {.ao = other.ao};
-    vsh_run limited = vsh_run_default(), stopped = vsh_run_default();
-    limited.memory_limit = 1000;
-    stopped.progress = stop;
-    assert_fails(vsh_lightmap_fill_hidden(other.charts, &map, 0, &limited, NULL, &failure), VSH_ERROR_LIMIT,
-                 "hidden charts");
-    assert_fails(vsh_lightmap_fill_hidden(other.charts, &map, 0, &stopped, NULL, &failure),
-                 VSH_ERROR_CANCELLED, "");
-    assert_fails(vsh_lightmap_fill_hidden(other.charts, &none, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
-                 "");
-    assert_fails(vsh_lightmap_fill_hidden(NULL, &map, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    assert_fails(vsh_lightmap_fill_hidden(other.charts, NULL, 0, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
-                 "");
+    const vsh_run limited = run_within(1000), stopped = run_watched(stop, NULL);
+    const struct {
+        const vsh_charts *charts;
+        const vsh_lightmap *map;
+        const vsh_run *run;
+        vsh_result code;
+    } cases[] = {{other.charts, &map, &limited, VSH_ERROR_LIMIT},
+                 {other.charts, &map, &stopped, VSH_ERROR_CANCELLED},
+                 {other.charts, &none, NULL, VSH_ERROR_ARGUMENT},
+                 {other.charts, NULL, NULL, VSH_ERROR_ARGUMENT},
+                 {NULL, &map, NULL, VSH_ERROR_ARGUMENT}};
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        assert_fails(vsh_lightmap_fill_hidden(cases[i].charts, cases[i].map, 0, cases[i].run, NULL, &failure),
+                     cases[i].code, i == 0 ? "hidden charts" : "");
+    }
     fill(&other, 4);
     assert_memory_equal(s.ao, other.ao, TEXELS * sizeof *s.ao);
 }

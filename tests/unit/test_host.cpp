@@ -1,25 +1,20 @@
 // Hosts that have set something: rounding, flush to zero, a locale with a decimal comma, arenas and threads
 // of their own. Every call gives the same bits as in a plain program, and gives back what the host had set.
 #include <clocale>
-#include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "base/bytes.h"
 #include "base/floats.h"
-#include "base/hash.h"
-#include "extern/tsan.h"
+#include "extern/tbb.h"
 
-#include <sys/stat.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
-#include <unistd.h>
-#include <vdbshade/vdbshade.h>
 
-#include "testing.h"
+#include "folder.h"
 
 // A host that exports its own Embree (tests/CMakeLists.txt).
 extern "C" {
@@ -35,9 +30,7 @@ namespace {
 
 OWNER(vsh_provenance)
 
-std::string folder;
-
-// A failure on another thread than the test's is told by its text, not by cmocka.
+// Keeps the text of a failure, as cmocka cannot report one of another thread.
 struct Outcome {
     uint64_t hash = 0;
     std::string failure;
@@ -56,13 +49,6 @@ struct Outcome {
     }
 };
 
-void write_text(const char *name, const char *text) {
-    FILE *file = std::fopen((folder + "/" + name).c_str(), "wb");
-    assert_non_null(file);
-    std::fputs(text, file);
-    assert_int_equal(std::fclose(file), 0);
-}
-
 // Everything that reads numbers, computes with them or writes them.
 Outcome work(int32_t threads = 0) {
     Outcome o;
@@ -73,8 +59,7 @@ Outcome work(int32_t threads = 0) {
     OWNED(vsh_occluders) *occluders = nullptr;
     OWNED(vsh_provenance) *provenance = nullptr;
     vsh_error error{};
-    const std::string path = folder + "/scene.json";
-    if (o.check(vsh_scene_read(path.c_str(), nullptr, &scene, &error), error) &&
+    if (o.check(vsh_scene_read(at("scene.json"), nullptr, &scene, &error), error) &&
         o.check(vsh_assets_load(scene, &run, &assets, &error), error) &&
         o.check(vsh_scene_casters(scene, assets, &run, &grid, &error), error) &&
         o.check(vsh_occluders_from_grid(grid, nullptr, &run, &occluders, &error), error)) {
@@ -114,23 +99,17 @@ Outcome work(int32_t threads = 0) {
 }
 
 void expect_same(const Outcome &plain, const Outcome &other, const char *host) {
-    if (!other.failure.empty()) {
-        fail_msg("%s: %s", host, other.failure.c_str());
-    }
-    if (plain.hash != other.hash) {
-        fail_msg("%s: other bits", host);
-    }
+    assert_that(other.failure.empty(), "%s: %s", host, other.failure.c_str());
+    assert_that(plain.hash == other.hash, "%s: other bits", host);
 }
 
 Outcome plain() {
     const Outcome o = work(1);
-    if (!o.failure.empty()) {
-        fail_msg("%s", o.failure.c_str());
-    }
+    assert_that(o.failure.empty(), "%s", o.failure.c_str());
     return o;
 }
 
-// test_environment has every setting, of calls that read no file.
+// test_bits has every setting, of calls that read no file.
 TEST(rounding_and_flushing_to_zero_change_nothing_and_are_given_back) {
     const Outcome expected = plain();
     const vshi_floats host = vshi_floats_get();
@@ -152,9 +131,9 @@ TEST(rounding_and_flushing_to_zero_change_nothing_and_are_given_back) {
 TEST(a_decimal_comma_changes_nothing_and_is_given_back) {
     const Outcome expected = plain();
     const std::string make =
-        "localedef -i de_DE -f UTF-8 " + folder + "/de_DE.UTF-8 >" + folder + "/log 2>&1";
+        std::string("localedef -i de_DE -f UTF-8 ") + at("de_DE.UTF-8") + " >" + at("log") + " 2>&1";
     const int made = std::system(make.c_str());
-    setenv("LOCPATH", folder.c_str(), 1);
+    setenv("LOCPATH", folder, 1);
     if (std::setlocale(LC_ALL, "de_DE.UTF-8") == nullptr) {
         print_message("skipped: no locale with a comma could be made (%d)\n", made);
         unsetenv("LOCPATH");
@@ -189,13 +168,13 @@ TEST(arenas_of_the_host_change_nothing) {
     std::vector<Outcome> all(6);
     static const char handover = 0; // the body reads nothing before it is taken
     const auto body = [&](size_t i) {
-        vshi::take(&handover);
+        vshi::acquire(&handover);
         all[i] = work(int32_t(i));
-        vshi::give(&handover);
+        vshi::release(&handover);
     };
-    vshi::give(&handover);
+    vshi::release(&handover);
     tbb::parallel_for(size_t{0}, all.size(), body);
-    vshi::take(&handover);
+    vshi::acquire(&handover);
     for (const Outcome &o : all) {
         expect_same(expected, o, "within the host's own loop");
     }
@@ -205,8 +184,7 @@ TEST(arenas_of_the_host_change_nothing) {
 TEST(many_threads_share_one_field) {
     vsh_sdf_node node = vsh_sdf_node_default();
     const vsh_sdf sdf = {&node, 1};
-    vsh_grid_options grid_options = vsh_grid_options_default();
-    grid_options.voxel_size = 0.0625;
+    const vsh_grid_options grid_options = with_voxel(0.0625);
     OWNED(vsh_grid) *grid = nullptr;
     OWNED(vsh_occluders) *occluders = nullptr;
     vsh_error error{};
@@ -246,28 +224,21 @@ TEST(embree_of_the_host_is_not_called) {
     const double low[3] = {0, 0, 0}, high[3] = {1, 1, 1};
     float corners[24];
     const vsh_mesh mesh = box_mesh(corners, low, high);
-    OWNED(vsh_triangles) *triangles = nullptr;
-    assert_ok(vsh_triangles_create(&mesh, 1, nullptr, &triangles, &failure));
+    OWNED(vsh_occluders) *occluders = nullptr;
+    assert_ok(vsh_occluders_create(&mesh, 1, nullptr, nullptr, &occluders, &failure));
     assert_false(host_called);
 }
 
-int make_folder(void **) {
-    char name[512], here[400];
-    const char *place = std::getenv("TMPDIR");
-    std::snprintf(name, sizeof name, "%s/vdbshade-host-XXXXXX",
-                  place != nullptr                       ? place
-                  : getcwd(here, sizeof here) != nullptr ? here
-                                                         : ".");
-    if (mkdtemp(name) == nullptr) {
+int make_files(void **state) {
+    if (make_folder(state) != 0) {
         return 1;
     }
-    folder = name;
-    write_text("post.obj", "v -0.25 0 -0.25\nv 0.25 0 -0.25\nv 0.25 0 0.25\nv -0.25 0 0.25\n"
-                           "v -0.25 1.5 -0.25\nv 0.25 1.5 -0.25\nv 0.25 1.5 0.25\nv -0.25 1.5 0.25\n"
-                           "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n");
-    write_text("balls.csv", "0.75, 0.5, 0.75, 0.25\n-0.75 0.5 -0.75 0.125\n");
-    write_text(
-        "scene.json",
+    write_string(at("post.obj"), "v -0.25 0 -0.25\nv 0.25 0 -0.25\nv 0.25 0 0.25\nv -0.25 0 0.25\n"
+                                 "v -0.25 1.5 -0.25\nv 0.25 1.5 -0.25\nv 0.25 1.5 0.25\nv -0.25 1.5 0.25\n"
+                                 "f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1\n");
+    write_string(at("balls.csv"), "0.75, 0.5, 0.75, 0.25\n-0.75 0.5 -0.75 0.125\n");
+    write_string(
+        at("scene.json"),
         "{\"casters\": [{\"mesh\": \"post.obj\"}, {\"spheres\": \"balls.csv\", \"voxelised\": true},"
         " {\"sdf\": {\"shape\": \"plane\", \"half_size\": [1.5, 1.5], \"thickness\": 0.25}}],"
         " \"voxel_size\": 0.0625, \"ao\": {\"distance\": 0.75},"
@@ -276,10 +247,6 @@ int make_folder(void **) {
     return 0;
 }
 
-int remove_folder(void **) {
-    return std::system(("rm -rf '" + folder + "'").c_str());
-}
-
 } // namespace
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_files, remove_folder)

@@ -1,18 +1,18 @@
-// EXR and PNG files as other programs see them: read by OpenImageIO, with no code of ours.
+// EXR and PNG files as other programs see them, read by OpenImageIO with no code of ours; and EXR files in
+// tiles, which this library reads and does not write.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <limits>
 #include <string>
-#include <unistd.h>
 #include <vector>
-
-#include <vdbshade/image.h>
 
 #include <OpenImageIO/imageio.h>
 
 #include "testing.h"
+
+#include "image/image.h"
 
 namespace {
 
@@ -49,16 +49,9 @@ struct SeenExr {
     OIIO::TypeDesc type;
     std::string rgb; // attribute
 
-    int find(const std::string &name) const {
-        for (size_t c = 0; c < names.size(); ++c) {
-            if (names[c] == name) {
-                return static_cast<int>(c);
-            }
-        }
-        return -1;
-    }
     float at(const std::string &name, size_t texel) const {
-        return values[texel * names.size() + static_cast<size_t>(find(name))];
+        const auto channel = std::find(names.begin(), names.end(), name) - names.begin();
+        return values.at(texel * names.size() + static_cast<size_t>(channel));
     }
 };
 
@@ -112,7 +105,7 @@ TEST(rgba_come_first_and_the_named_channels_stay) {
     }
 }
 
-TEST(the_picture_is_what_there_is) {
+TEST(the_picture_is_made_of_the_channels_that_exist) {
     const struct {
         std::vector<const char *> names;
         const char *rgb;
@@ -271,7 +264,7 @@ void assert_channel(const Seen &seen, size_t at, int channel, int32_t bits, doub
             fail_msg("channel %zu, texel %zu: %g is %g, expected %g", at, i, value, found, expected);
         }
         assert_true(curve != srgb || std::isnan(value) ||
-                    std::fabs(vsh_srgb_to_linear(found / most) - cut) <= 1.2 / most);
+                    std::fabs(vshi_srgb_to_linear(found / most) - cut) <= 1.2 / most);
     }
 }
 
@@ -371,6 +364,75 @@ TEST(the_longest_row_is_written) {
     std::remove(path);
     image.width = 1000001;
     assert_int_equal(vsh_image_check(path, &image, nullptr, &failure), VSH_ERROR_ARGUMENT);
+}
+
+// --- EXR files in tiles
+
+struct Tiling {
+    int width, height, tile_width, tile_height, left, top;
+    bool levels; // coarser ones hold NaN
+};
+
+std::vector<float> write_tiles(const char *path, const Tiling &t) {
+    OIIO::ImageSpec spec(t.width, t.height, 2, OIIO::TypeDesc::FLOAT);
+    spec.channelnames = {"ao", "shadow"};
+    spec.x = t.left;
+    spec.y = t.top;
+    spec.tile_width = t.tile_width;
+    spec.tile_height = t.tile_height;
+    spec.attribute("compression", "none");
+    spec.attribute("textureformat", t.levels ? "Plain Texture" : "");
+    std::vector<float> pixels(2 * size_t(t.width) * size_t(t.height));
+    for (size_t i = 0; i < pixels.size(); ++i) {
+        pixels[i] = share_at(i % 2, i / 2);
+    }
+    const auto output = OIIO::ImageOutput::create(path);
+    assert_true(output->open(path, spec) && output->write_image(OIIO::TypeDesc::FLOAT, pixels.data()));
+    const std::vector<float> none(pixels.size(), NAN);
+    while (t.levels && (spec.width > 1 || spec.height > 1)) {
+        spec.width = std::max(1, spec.width / 2);
+        spec.height = std::max(1, spec.height / 2);
+        assert_true(output->open(path, spec, OIIO::ImageOutput::AppendMIPLevel) &&
+                    output->write_image(OIIO::TypeDesc::FLOAT, none.data()));
+    }
+    assert_true(output->close());
+    return pixels;
+}
+
+TEST(the_finest_level_of_tiles_is_read_to_the_bit) {
+    const Tiling tilings[] = {{37, 23, 16, 8, 0, 0, false}, {16, 16, 64, 64, 0, 0, false},
+                              {1, 40, 8, 8, 0, 0, false},   {37, 23, 16, 16, -7, 1000, false},
+                              {64, 64, 32, 32, 0, 0, true}, {50, 30, 16, 16, 3, -3, true}};
+    for (const Tiling &t : tilings) {
+        const std::vector<float> pixels = write_tiles("tiles.exr", t);
+        OWNED(vsh_image_file) *file = nullptr;
+        assert_ok(vsh_image_read("tiles.exr", nullptr, &file, &failure));
+        const vsh_image view = vsh_image_view(file);
+        assert_true(view.width == t.width && view.height == t.height && view.channel_count == 2);
+        assert_string_equal(view.names[0], "ao");
+        assert_string_equal(view.names[1], "shadow");
+        for (size_t i = 0; i < pixels.size(); ++i) {
+            assert_true(view.planes[i % 2][i / 2] == pixels[i]);
+        }
+    }
+}
+
+TEST(reading_tiles_can_be_cancelled_and_cut_files_are_refused) {
+    write_tiles("tiles.exr", {40, 64, 16, 16, 0, 0, false});
+    vsh_image_file *file = nullptr;
+    vsh_run run = vsh_run_default();
+    run.progress = [](void *, const char *, double fraction) { return int32_t(fraction >= 0.5); };
+    assert_fails(vsh_image_read("tiles.exr", &run, &file, &failure), VSH_ERROR_CANCELLED, "");
+    std::ifstream whole("tiles.exr", std::ios::binary);
+    const std::string bytes{std::istreambuf_iterator<char>(whole), {}};
+    for (const size_t cut : {size_t(1), size_t(100), bytes.size() / 2, bytes.size() - 400}) {
+        std::ofstream("tiles.exr", std::ios::binary) << bytes.substr(0, bytes.size() - cut);
+        const vsh_result result = vsh_image_read("tiles.exr", nullptr, &file, &failure);
+        assert_true(result == VSH_ERROR_INPUT || result == VSH_ERROR_READ);
+        assert_non_null(std::strstr(failure.message, "tiles.exr"));
+        assert_null(file);
+    }
+    std::remove("tiles.exr");
 }
 
 } // namespace

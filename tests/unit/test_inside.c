@@ -1,7 +1,8 @@
-/* Samples that a ray links to the one before take over what is said of it (src/shade/inside.c,
- * src/bake/origins.c): held against each sample looked at by itself. */
+/* A sample that a ray links to the one before is as that one inside a solid or outside (src/shade/inside.c,
+ * src/bake/origins.c). The tests look at each sample by itself. */
 #include "bake/texels.h"
-#include "shade/inside.h"
+#include "handles.h"
+#include "shade/shade.h"
 #include "testing.h"
 
 typedef struct counts {
@@ -10,22 +11,16 @@ typedef struct counts {
 
 /* Bakes meshes without voxels, and looks at each sample on a flat triangle anew. */
 static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
-    OWNED(vsh_triangles) *triangles = NULL;
-    OWNED(vsh_occluders) *occluders = NULL;
-    OWNED(vsh_charts) *charts = NULL;
-    OWNED(vsh_texels) *texels = NULL;
-    assert_ok(vsh_triangles_create(meshes, mesh_count, NULL, &triangles, &failure));
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
-    parts.triangles = triangles;
-    assert_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
+    OWNED(vshi_triangles) *triangles = triangles_from(meshes, mesh_count);
+    OWNED(vsh_occluders) *occluders = occluders_from_triangles(triangles);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = size;
     options.ao_spacing = 1;
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 0.1;
     options.shade.rays = 4;
-    assert_ok(vsh_charts_create(meshes, mesh_count, &options, NULL, NULL, &charts, &failure));
-    assert_ok(vsh_texels_create(charts, NULL, &texels, &failure));
+    OWNED(vsh_charts) *charts = charts_from(meshes, mesh_count, &options);
+    OWNED(vshi_texels) *texels = texels_from(charts);
     const vshi_samples *samples = &texels->samples;
     const size_t count = (size_t)size * (size_t)size;
     FREED float *ao = calloc(count, sizeof *ao), *coverage = calloc(count, sizeof *coverage);
@@ -50,8 +45,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
 
 /* Walls whose arches stand in them, columns on their bases, all solids: charts end where others begin. */
 TEST(samples_of_solids_in_each_other_are_where_they_are_by_themselves) {
-    OWNED(vsh_model) *model = NULL;
-    assert_ok(vsh_model_read(VSH_ASSETS "/cloister.glb", NULL, &model, &failure));
+    OWNED(vsh_model) *model = model_from(VSH_ASSETS "/cloister.glb");
     const size_t mesh_count = vsh_model_mesh_count(model);
     FREED vsh_mesh *meshes = calloc(mesh_count, sizeof *meshes);
     for (size_t i = 0; i < mesh_count; ++i) {
@@ -71,12 +65,7 @@ TEST(samples_below_a_hood_are_where_they_are_by_themselves) {
     static const float uvs[] = {0, 0, 1, 0, 1, 1, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0};
     static const uint32_t indices[] = {0, 1, 2,  0, 2,  3,  4, 5, 9, 4, 9, 8,  5, 6, 10, 5, 10, 9,
                                        6, 7, 11, 6, 11, 10, 7, 4, 8, 7, 8, 11, 8, 9, 10, 8, 10, 11};
-    const vsh_mesh mesh = {.name = "hood",
-                           .positions = positions,
-                           .uvs = uvs,
-                           .indices = indices,
-                           .vertex_count = 12,
-                           .triangle_count = 12};
+    const vsh_mesh mesh = mesh_of_arrays("hood", positions, uvs, 12, indices, 12);
     const counts found = compare(&mesh, 1, 256);
     /* a ray that climbs by 0.06 escapes within 0.04 / 0.06 of the rim: the rest is a square, and a little
      * where none of the directions goes straight to the rim */

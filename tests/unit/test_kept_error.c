@@ -4,7 +4,6 @@
 #include "images.h"
 #include "metrics.h"
 #include "scenes.h"
-#include "testing.h"
 
 enum { SIZE = 96, RAYS = 1024, MOST_SOLIDS = 16, FINE = 512 };
 static const double SUN[3] = {-0.5, 0.6, -0.3}, ANGLE = 0.08726646259971647, AO_DISTANCE = 0.8;
@@ -19,25 +18,21 @@ typedef struct shapes {
 static void add_shape(shapes *s, const truth_solid *solid) {
     char *end = s->text + strlen(s->text);
     const size_t left = sizeof s->text - strlen(s->text);
-    const char *comma = s->count > 0 ? "," : "";
     const double *c = solid->center, *h = solid->half;
-    int written = 0;
-    if (solid->shape == TRUTH_BOX) {
-        written =
-            snprintf(end, left,
-                     "%s{\"sdf\": {\"shape\": \"box\", \"half_size\": [%g, %g, %g], \"translate\": [%g, "
-                     "%g, %g]}}",
-                     comma, h[0], h[1], h[2], c[0], c[1], c[2]);
-    } else if (solid->shape == TRUTH_SPHERE) {
-        written = snprintf(end, left, "%s{\"spheres\": [[%g, %g, %g, %g]]}", comma, c[0], c[1], c[2],
-                           solid->radius);
+    const char *comma = s->count > 0 ? "," : "";
+    if (solid->shape == TRUTH_SPHERE) {
+        snprintf(end, left, "%s{\"spheres\": [[%g, %g, %g, %g]]}", comma, c[0], c[1], c[2], solid->radius);
     } else {
-        written = snprintf(end, left,
-                           "%s{\"sdf\": {\"shape\": \"torus\", \"radius\": %g, \"tube_radius\": %g, "
-                           "\"translate\": [%g, %g, %g]}}",
-                           comma, solid->radius, solid->minor_radius, c[0], c[1], c[2]);
+        char shape[128];
+        snprintf(shape, sizeof shape,
+                 solid->shape == TRUTH_BOX ? "\"box\", \"half_size\": [%g, %g, %g]"
+                                           : "\"torus\", \"radius\": %g, \"tube_radius\": %g",
+                 solid->shape == TRUTH_BOX ? h[0] : solid->radius,
+                 solid->shape == TRUTH_BOX ? h[1] : solid->minor_radius, h[2]);
+        snprintf(end, left, "%s{\"sdf\": {\"shape\": %s, \"translate\": [%g, %g, %g]}}", comma, shape, c[0],
+                 c[1], c[2]);
     }
-    assert_true(written > 0 && (size_t)written < left && s->count < MOST_SOLIDS);
+    assert_true(strlen(s->text) + 1 < sizeof s->text && s->count < MOST_SOLIDS);
     s->solids[s->count++] = *solid;
 }
 
@@ -81,18 +76,10 @@ typedef struct baked {
     double shadow_error, ao_error; /* estimates */
 } baked;
 
-static void take_plane(const vsh_image *image, const char *name, int size, float *plane) {
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        if (strcmp(image->names[c], name) == 0) {
-            memcpy(plane, image->planes[c], (size_t)size * (size_t)size * sizeof *plane);
-            return;
-        }
-    }
-    fail_msg("no channel %s", name);
-}
+static baked b;
 
 /* Bakes casters onto the floor of the seeds' scene. */
-static void bake(const char *casters, double max_error, int size, baked *b) {
+static void bake(const char *casters, double max_error, int size, baked *out) {
     char text[8192];
     snprintf(
         text, sizeof text,
@@ -104,21 +91,31 @@ static void bake(const char *casters, double max_error, int size, baked *b) {
     vsh_bake_error errors[3];
     vsh_bake_report report = {.errors = errors};
     assert_ok(vsh_bake_scene(scene, NULL, NULL, &report, &failure));
-    b->shadow_error = vsh_bake_error_rmse(&errors[0]);
-    b->ao_error = vsh_bake_error_rmse(&errors[1]);
-    OWNED(vsh_image_file) *file = NULL;
-    assert_ok(vsh_image_read(at("out.exr"), NULL, &file, &failure));
+    out->shadow_error = vsh_bake_error_rmse(&errors[0]);
+    out->ao_error = vsh_bake_error_rmse(&errors[1]);
+    OWNED(vsh_image_file) *file = image_from(at("out.exr"));
     const vsh_image image = vsh_image_view(file);
-    take_plane(&image, "shadow.sun", size, b->shadow);
-    take_plane(&image, "ao", size, b->ao);
-    take_plane(&image, "A", size, b->valid);
+    const size_t bytes = (size_t)size * (size_t)size * sizeof(float);
+    memcpy(out->shadow, plane_of(&image, "shadow.sun"), bytes);
+    memcpy(out->ao, plane_of(&image, "ao"), bytes);
+    memcpy(out->valid, plane_of(&image, "A"), bytes);
 }
 
-static void check(const char *what, double max_error, const float *values, const float *truth,
-                  const float *valid, double estimate) {
-    const truth_metrics m = truth_compare(SIZE * SIZE, values, truth, valid);
+/* The middles of texels on the floor. */
+static void place_texels(int size, double (*points)[3]) {
+    for (int i = 0; i < size * size; ++i) {
+        points[i][0] = -2.5 + 5.0 * ((double)(i % size) + 0.5) / size;
+        points[i][1] = 1e-5;
+        points[i][2] = -2.5 + 5.0 * ((double)(i / size) + 0.5) / size;
+    }
+}
+
+static void check(const char *scene, const char *what, double max_error, const float *values,
+                  const float *truth, double estimate) {
+    const truth_metrics m = truth_compare(SIZE * SIZE, values, truth, b.valid);
     assert_that(m.rmse <= max_error && estimate >= 0.8 * m.rmse,
-                "%s: %g is asked, %g is the error, %g the estimate", what, max_error, m.rmse, estimate);
+                "%s, %s: %g is asked, %g is the error, %g the estimate", scene, what, max_error, m.rmse,
+                estimate);
 }
 
 TEST(procedural_scenes_keep_the_error_that_is_asked_for) {
@@ -132,13 +129,8 @@ TEST(procedural_scenes_keep_the_error_that_is_asked_for) {
     static const double up[3] = {0.0, 1.0, 0.0}, errors[] = {0.02, 0.005};
     static float shadow[SIZE * SIZE], ao[SIZE * SIZE];
     static double points[SIZE * SIZE][3];
-    static baked b;
-    for (size_t i = 0; i < SIZE * SIZE; ++i) {
-        points[i][0] = -2.5 + 5.0 * ((double)(i % SIZE) + 0.5) / SIZE;
-        points[i][1] = 1e-5;
-        points[i][2] = -2.5 + 5.0 * ((double)(i / SIZE) + 0.5) / SIZE;
-    }
-    for (size_t k = 0; k < sizeof scenes / sizeof scenes[0]; ++k) {
+    place_texels(SIZE, points);
+    for (size_t k = 0; k < COUNT_OF(scenes); ++k) {
         shapes s = {.count = 0};
         scenes[k].make(&s);
         const truth_scene truth = {s.solids, s.count};
@@ -146,13 +138,10 @@ TEST(procedural_scenes_keep_the_error_that_is_asked_for) {
         for (size_t i = 0; i < SIZE * SIZE; ++i) {
             ao[i] = (float)truth_ao(truth, points[i], up, AO_DISTANCE, RAYS);
         }
-        for (size_t e = 0; e < sizeof errors / sizeof errors[0]; ++e) {
-            char what[64];
+        for (size_t e = 0; e < COUNT_OF(errors); ++e) {
             bake(s.text, errors[e], SIZE, &b);
-            snprintf(what, sizeof what, "%s, shadow", scenes[k].name);
-            check(what, errors[e], b.shadow, shadow, b.valid, b.shadow_error);
-            snprintf(what, sizeof what, "%s, AO", scenes[k].name);
-            check(what, errors[e], b.ao, ao, b.valid, b.ao_error);
+            check(scenes[k].name, "shadow", errors[e], b.shadow, shadow, b.shadow_error);
+            check(scenes[k].name, "AO", errors[e], b.ao, ao, b.ao_error);
         }
     }
 }
@@ -162,20 +151,12 @@ TEST(procedural_scenes_keep_the_error_that_is_asked_for) {
 TEST(a_level_set_keeps_its_voxels_beside_a_large_plane) {
     static baked alone, beside;
     char text[1024];
-    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
-    nodes[0].shape = VSH_SDF_BOX;
-    nodes[0].size[0] = nodes[0].size[1] = nodes[0].size[2] = 0.6;
+    vsh_sdf_node nodes[3] = {box_node(0.6, 0.6, 0.6), vsh_sdf_node_default(),
+                             operation_node(VSH_SDF_UNION, 0, 1)};
     nodes[0].translation[1] = 1.05;
     nodes[1].radius = 0.35;
     nodes[1].translation[1] = 2.3;
-    nodes[2].shape = VSH_SDF_UNION;
-    nodes[2].left = 0;
-    nodes[2].right = 1;
-    const vsh_sdf sdf = {nodes, 3};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.voxel_size = 0.0117;
-    OWNED(vsh_grid) *grid = NULL;
-    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
+    OWNED(vsh_grid) *grid = grid_from_sdf(&(vsh_sdf){nodes, 3}, 0.0117);
     assert_ok(vsh_grid_write(grid, at("shape.vdb"), NULL, NULL, 0, &failure));
     snprintf(text, sizeof text, "{\"vdb\": \"%s\"}", at("shape.vdb"));
     bake(text, 0.005, SIZE, &alone);
@@ -208,17 +189,12 @@ static double bend(const float *values, const float *truth, int first, int last)
 TEST(penumbrae_rise_smoothly_at_their_ends) {
     enum { FIRST = 200, LAST = 240 };
     static const double up[3] = {0.0, 1.0, 0.0};
-    static baked b;
     static float truth[FINE * FINE];
     static double points[FINE * FINE][3];
     shapes s = {.count = 0};
     make_far_plane(&s);
     bake(s.text, 0.02, FINE, &b);
-    for (int i = FIRST * FINE; i < LAST * FINE; ++i) {
-        points[i][0] = -2.5 + 5.0 * ((double)(i % FINE) + 0.5) / FINE;
-        points[i][1] = 1e-5;
-        points[i][2] = -2.5 + 5.0 * ((double)(i / FINE) + 0.5) / FINE;
-    }
+    place_texels(FINE, points);
     const size_t from = FIRST * FINE;
     truth_lights((truth_scene){s.solids, s.count}, (LAST - FIRST) * FINE, points[from], up, SUN,
                  tan(0.5 * ANGLE), INFINITY, 4 * RAYS, truth + from);

@@ -24,10 +24,10 @@ static void make_box(box *b, const double low[3], const double high[3]) {
 typedef struct scene {
     sphere ball;
     vsh_field *field;
-    vsh_triangles *triangles;
+    vshi_triangles *triangles;
     vsh_charts *charts;
-    vsh_texels *texels, *facets; /* the same samples, of the sphere without normals */
-    vsh_texel_samples lifted, flat;
+    vshi_texels *texels, *facets; /* the same samples, of the sphere without normals */
+    vshi_texel_samples lifted, flat;
 } scene;
 
 static void open_scene(scene *s, const box *other) {
@@ -38,8 +38,8 @@ static void open_scene(scene *s, const box *other) {
     grid_options.resolution = 64;
     OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure));
-    assert_ok(vsh_field_create(grid, NULL, NULL, &s->field, &failure));
-    assert_ok(vsh_triangles_create(casters, count, NULL, &s->triangles, &failure));
+    assert_ok(vshi_field_create(grid, NULL, NULL, &s->field, &failure));
+    assert_ok(vshi_triangles_create(casters, count, NULL, &s->triangles, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = WIDTH;
     options.height = HEIGHT;
@@ -54,8 +54,8 @@ static void open_scene(scene *s, const box *other) {
     s->texels = rasterize(s->charts);
     OWNED(vsh_charts) *facets = create(&faceted, 1, options, NULL);
     s->facets = rasterize(facets);
-    s->lifted = vsh_texels_samples(s->texels);
-    s->flat = vsh_texels_samples(s->facets);
+    s->lifted = vshi_texels_samples(s->texels);
+    s->flat = vshi_texels_samples(s->facets);
     assert_int_equal(s->lifted.count, s->flat.count);
 }
 
@@ -71,11 +71,11 @@ static float value_at(const scene *s, const float *plane, size_t sample) {
 }
 
 static void close_scene(scene *s) {
-    vsh_texels_free(s->facets);
-    vsh_texels_free(s->texels);
+    vshi_texels_free(s->facets);
+    vshi_texels_free(s->texels);
     vsh_charts_free(s->charts);
-    vsh_triangles_free(s->triangles);
-    vsh_field_free(s->field);
+    vshi_triangles_free(s->triangles);
+    vshi_field_free(s->field);
     free_sphere(&s->ball);
 }
 
@@ -124,8 +124,8 @@ TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
     lights[1].radius = 0.02;
     for (int l = 0; l < 2; ++l) {
         bake(&s, &lights[l], 1, &(vsh_lightmap){.shadow = planes});
-        assert_ok(vsh_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions,
-                                   s.flat.geometric_normals, HAIR, &lights[l], 64, NULL, truth, &failure));
+        assert_ok(vshi_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions,
+                                    s.flat.geometric_normals, HAIR, &lights[l], 64, NULL, truth, &failure));
         size_t hidden = 0, off = 0;
         for (size_t i = 0; i < s.flat.count; ++i) {
             double to[3];
@@ -228,8 +228,8 @@ TEST(ao_close_to_a_wall_is_that_of_the_facets) {
     FREED_BY(close_scene) scene s;
     open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
-    assert_ok(vsh_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
-                           256, NULL, truth, &failure));
+    assert_ok(vshi_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
+                            256, NULL, truth, &failure));
     size_t under = 0;
     for (size_t i = 0; i < s.flat.count; ++i) {
         if (FACE - s.flat.positions[3 * i] < 0.045) {
@@ -287,12 +287,12 @@ static double mean_ao_between_walls(const float *normals) {
     make_box(&walls[0], (double[]){-0.1, 0.0, -0.1}, (double[]){0.0, 3.0, 0.1});
     make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
     const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
-    OWNED(vsh_triangles) *triangles = NULL;
-    assert_ok(vsh_triangles_create(casters, 3, NULL, &triangles, &failure));
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
+    OWNED(vshi_triangles) *triangles = NULL;
+    assert_ok(vshi_triangles_create(casters, 3, NULL, &triangles, &failure));
+    vshi_occluder_parts parts = {.field = NULL};
     parts.triangles = triangles;
     OWNED(vsh_occluders) *occluders = NULL;
-    assert_ok(vsh_occluders_from_parts(&parts, &occluders, &failure));
+    assert_ok(vshi_occluders_from_parts(&parts, &occluders, &failure));
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = 128;
     options.padding = 0;
@@ -324,7 +324,7 @@ TEST(leaning_normals_do_not_lift_ao_over_low_walls) {
 }
 
 /* A wall at growing distances from the sphere, under a wide sun that the facets' planes cut. */
-TEST(a_lift_fades_as_neighbours_come_near) {
+TEST(a_lift_fades_near_other_triangles) {
     enum { WALLS = 40 };
     static const double FIRST = 1.0, STEP = 0.002;
     vsh_light light = sun_towards(0.0, 1.0, 0.0);

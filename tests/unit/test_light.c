@@ -26,6 +26,16 @@ static vsh_light fading(void) {
     return light;
 }
 
+static vsh_light area(void) {
+    vsh_light light = fading();
+    light.type = VSH_LIGHT_RECTANGLE;
+    light.edge_u[0] = 1.2;
+    light.edge_u[1] = light.edge_u[2] = light.edge_v[0] = light.edge_v[1] = 0.0;
+    light.edge_v[2] = 0.8;
+    strcpy(light.name, "area");
+    return light;
+}
+
 static void accepts(const vsh_light *light) {
     failure.message[0] = '\0';
     assert_ok(vsh_light_check(light, &failure));
@@ -45,7 +55,7 @@ static void refuses(const vsh_light *light, const char *message) {
 }
 
 TEST(defaults_zero_sizes_and_fields_of_other_types_pass) {
-    vsh_light lights[7] = {sun(), lamp(), spot(), sun(), lamp(), sun(), lamp()};
+    vsh_light lights[8] = {sun(), lamp(), spot(), sun(), lamp(), sun(), lamp(), area()};
     lights[3].angle = lights[4].radius = 0.0;
     vsh_light *light = &lights[5];
     light->radius = -1.0;
@@ -56,7 +66,7 @@ TEST(defaults_zero_sizes_and_fields_of_other_types_pass) {
     ++light;
     light->angle = light->reach = -1.0;
     memset(light->direction, 0, sizeof light->direction);
-    for (size_t i = 0; i < 7; ++i) {
+    for (size_t i = 0; i < COUNT_OF(lights); ++i) {
         accepts(&lights[i]);
     }
 }
@@ -91,6 +101,16 @@ TEST(bad_values_are_named_with_field_and_limit) {
         {lamp, &light.radius, NAN, "radius nan is out of range 0 … inf (excluded)"},
         {lamp, &light.position[2], NAN, "position[2] nan is out of range -inf (excluded) … inf (excluded)"},
         {fading, &light.reach, 0.0, "reach 0 is out of range 0 (excluded) … inf (excluded)"},
+        {area, &light.edge_u[0], 0.0, "edge_u (0, 0, 0): expected a length over 0"},
+        {area, &light.edge_u[0], 1e-20, "edge_u has the length 1e-20, out of range 1e-15 … 1e+15"},
+        {area, &light.edge_v[2], 1e200, "edge_v has the length inf, out of range 1e-15 … 1e+15"},
+        {area, &light.edge_v[1], NAN, "edge_v[1] nan is out of range -inf (excluded) … inf (excluded)"},
+        {area, &light.edge_v[0], 0.8,
+         "edge_u and edge_v are not at right angles: the cosine between them is 0.707106781, of at most "
+         "0.001"},
+        {area, &light.position[2], INFINITY,
+         "position[2] inf is out of range -inf (excluded) … inf (excluded)"},
+        {area, &light.reach, 0.0, "reach 0 is out of range 0 (excluded) … inf (excluded)"},
         {spot, &light.axis[1], 0.0, "axis (0, 0, 0): expected a length over 0"},
         {spot, &light.axis[0], NAN, "axis[0] nan is out of range -inf (excluded) … inf (excluded)"},
         {spot, &light.inner_angle, 0.75, "inner_angle 0.75 is out of range 0 … outer_angle 0.5"},
@@ -98,7 +118,7 @@ TEST(bad_values_are_named_with_field_and_limit) {
         {spot, &light.outer_angle, 0.0, "outer_angle 0 is out of range 0 (excluded) … 3.14159265"},
         {spot, &light.outer_angle, NAN, "outer_angle nan is out of range 0 (excluded) … 3.14159265"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         light = cases[i].make();
         *cases[i].field = cases[i].value;
         refuses(&light, cases[i].message);
@@ -106,13 +126,21 @@ TEST(bad_values_are_named_with_field_and_limit) {
     light = sun();
     light.type = VSH_LIGHT_RECTANGLE + 1;
     refuses(&light, "type 4 is out of range 0 … 3");
+    light = area();
+    light.two_sided = 2;
+    refuses(&light, "two_sided 2 is out of range 0 … 1");
+    light.two_sided = 1;
+    light.falloff = VSH_FALLOFF_NONE;
+    char text[200];
+    vsh_light_text(&light, text, sizeof text);
+    assert_string_equal(text, "rectangle at 0 0 0, sides 1.2 0 0 and 0 0 0.8, two-sided");
     light = sun();
     light.falloff = -1;
     refuses(&light, "falloff -1 is out of range 0 … 2");
     refuses(NULL, "light: is NULL");
 }
 
-TEST(names_are_what_a_channel_can_hold) {
+TEST(lights_have_names_that_a_channel_can_hold) {
     static const char *const good[] = {"key-Light_2", "",
                                        "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"};
     vsh_light light = sun();

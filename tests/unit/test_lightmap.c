@@ -1,7 +1,72 @@
-/* What a lightmap holds: a wall that stands on a floor, a coarse smooth sphere, an open sheet. */
-#include "lightmaps.h"
-#include "previews.h"
+/* Lightmaps of a wall that stands on a floor, of a coarse smooth sphere and of an open sheet. Padding gives
+ * texels outside of charts their nearest neighbour's value. */
+#include "bake/padding.h"
+#include "casts.h"
+#include "fields.h"
 #include "testing.h"
+#include "texels_of.h"
+
+enum { SIZE = 64, TEXELS = SIZE * SIZE };
+
+#define VOXEL 0.04
+#define WALL 0.2 /* half its thickness */
+
+/* The floor y = 0 over [-1, 1]², facing up; u runs along x, v along -z. */
+static const float FLOOR_POSITIONS[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1};
+static const float QUAD_UVS[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+
+static vsh_mesh floor_mesh(void) {
+    return quad_mesh("floor", FLOOR_POSITIONS, QUAD_UVS);
+}
+
+static double texel_x(uint32_t texel) {
+    return -1.0 + 2.0 * (texel % SIZE + 0.5) / SIZE;
+}
+
+/* A slab under y = 0 and, where `wall` is not zero, a wall |x| < WALL of height 1 across all of it. */
+static vsh_field *floor_field(int wall) {
+    static const truth_solid solids[2] = {
+        {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {1.5, 0.25, 1.5}},
+        {.shape = TRUTH_BOX, .center = {0.0, 0.5, 0.0}, .half = {WALL, 0.5, 1.5}}};
+    return field_of((truth_scene){solids, wall ? 2 : 1}, VOXEL, 0.0);
+}
+
+static vsh_field *field_of_mesh(const vsh_mesh *mesh, double voxel) {
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
+    return field_of_grid(grid, 0.0);
+}
+
+static vsh_light sun(double x, double y, double z, double angle) {
+    vsh_light light = vsh_light_default();
+    memcpy(light.direction, (double[]){x, y, z}, sizeof light.direction);
+    light.angle = angle;
+    return light;
+}
+
+/* Planes of one light, AO, irradiance and coverage. */
+typedef struct planes {
+    float shadow[TEXELS], ao[TEXELS], irradiance[3 * TEXELS], coverage[TEXELS];
+    float *lights[1];
+    vsh_lightmap all;
+} planes;
+
+static planes *new_planes(void) {
+    planes *p = malloc(sizeof *p);
+    memset(p, 0xff, sizeof *p); /* NaN: whatever is not written shows */
+    p->lights[0] = p->shadow;
+    p->all = (vsh_lightmap){
+        .shadow = p->lights, .ao = p->ao, .irradiance = p->irradiance, .coverage = p->coverage};
+    return p;
+}
+
+static void bake(const vsh_field *field, const vsh_charts *charts, const vsh_light *light,
+                 const vsh_lightmap *lightmap, vsh_bake_stats *stats, int32_t threads) {
+    vsh_run run = run_on(threads);
+    assert_ok(vsh_bake_lightmap(occluders_of(field), charts, light, light != NULL ? 1 : 0, NULL, &run,
+                                lightmap, stats, &failure));
+}
 
 /* Most tests bake these: a field, the charts of a mesh, planes. */
 typedef struct stage {
@@ -11,10 +76,15 @@ typedef struct stage {
     vsh_bake_stats stats;
 } stage;
 
+static vsh_charts *charts_of(const vsh_mesh *mesh, int32_t size, int32_t supersample, int32_t padding) {
+    vsh_lightmap_options options = size_of(size, size, supersample);
+    options.padding = padding;
+    return create(mesh, 1, options, NULL);
+}
+
 static stage begin(vsh_field *field, const vsh_mesh *mesh, int32_t size, int32_t supersample,
                    int32_t padding) {
-    return (stage){field, make_texels(mesh, 1, size, supersample, padding), new_planes(),
-                   vsh_bake_stats_zero()};
+    return (stage){field, charts_of(mesh, size, supersample, padding), new_planes(), vsh_bake_stats_zero()};
 }
 
 /* The floor, with a wall on it or without. */
@@ -31,7 +101,7 @@ static void bake_stage(stage *s, const vsh_light *light) {
 static void end(stage *s) {
     free(s->p);
     vsh_charts_free(s->charts);
-    vsh_field_free(s->field);
+    vshi_field_free(s->field);
 }
 
 TEST(a_floor_under_open_sky_is_exactly_lit) {
@@ -41,10 +111,8 @@ TEST(a_floor_under_open_sky_is_exactly_lit) {
         FREED_BY(end) stage s = begin_floor(0, sizes[k][0], 1, sizes[k][1]);
         bake_stage(&s, &light);
         const size_t texels = (size_t)(sizes[k][0] * sizes[k][0]);
-        for (size_t i = 0; i < texels; ++i) {
-            assert_true(s.p->shadow[i] == 1.0f);
-            assert_true(s.p->coverage[i] == 1.0f);
-        }
+        assert_all_equal(s.p->shadow, texels, 1.0f);
+        assert_all_equal(s.p->coverage, texels, 1.0f);
         assert_true(texels == TEXELS || isnan(s.p->coverage[texels]));
         assert_int_equal(s.stats.texels, texels);
         assert_int_equal(s.stats.invalid_texels, 0);
@@ -123,52 +191,24 @@ TEST(a_texel_is_the_mean_of_its_valid_samples) {
     end(&coarse);
 }
 
-/* A UV sphere, smooth, of `ROWS` × 2 `ROWS` cells, as receiver and caster. */
+/* Receiver and caster. */
 TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
-    enum { ROWS = 8, COLUMNS = 2 * ROWS, VERTICES = (ROWS + 1) * (COLUMNS + 1) };
-    float positions[3 * VERTICES], uvs[2 * VERTICES];
-    uint32_t indices[6 * ROWS * COLUMNS];
-    size_t v = 0, i = 0;
-    for (uint32_t r = 0; r <= ROWS; ++r) {
-        for (uint32_t c = 0; c <= COLUMNS; ++c, ++v) {
-            const double polar = 3.141592653589793 * r / ROWS, ring = r % ROWS == 0 ? 0.0 : sin(polar);
-            const double around = 6.283185307179586 * (c % COLUMNS) / COLUMNS;
-            positions[3 * v] = (float)(ring * cos(around));
-            positions[3 * v + 1] = (float)cos(polar);
-            positions[3 * v + 2] = (float)(-ring * sin(around));
-            uvs[2 * v] = (float)c / COLUMNS;
-            uvs[2 * v + 1] = 1.0f - (float)r / ROWS;
-            if (r < ROWS && c < COLUMNS) {
-                const uint32_t a = (uint32_t)v, b = a + COLUMNS + 1;
-                const uint32_t cell[6] = {a, b, b + 1, a, b + 1, a + 1};
-                memcpy(indices + i, cell, sizeof cell);
-                i += 6;
-            }
-        }
-    }
-    const vsh_mesh mesh = {.name = "ball",
-                           .positions = positions,
-                           .normals = positions,
-                           .uvs = uvs,
-                           .indices = indices,
-                           .vertex_count = VERTICES,
-                           .triangle_count = i / 3};
-    const vsh_light light = sun(0.3, 0.9, 0.2, 0.01);
-    const double length = sqrt(0.09 + 0.81 + 0.04);
-    FREED_BY(end) stage s = begin(field_of_mesh(&mesh, 0.02), &mesh, SIZE, 1, 0);
+    FREED_BY(free_sphere) sphere ball;
+    make_sphere(&ball, 8, 1.0);
+    const double towards[3] = {0.3, 0.9, 0.2};
+    const vsh_light light = sun(towards[0], towards[1], towards[2], 0.01);
+    FREED_BY(end) stage s = begin(field_of_mesh(&ball.mesh, 0.02), &ball.mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
     assert_int_equal(s.stats.invalid_texels, 0);
-    vsh_texels *texels = NULL;
-    assert_ok(vsh_texels_create(s.charts, NULL, &texels, &failure));
-    const vsh_texel_samples samples = vsh_texels_samples(texels);
+    OWNED(vshi_texels) *texels = rasterize(s.charts);
+    const vshi_texel_samples samples = vshi_texels_samples(texels);
     for (size_t k = 0; k < samples.count; ++k) {
         const float *n = samples.normals + 3 * k;
-        const double cosine = ((double)n[0] * 0.3 + (double)n[1] * 0.9 + (double)n[2] * 0.2) / length;
+        const double cosine = dot3((double[]){n[0], n[1], n[2]}, towards) / length3(towards);
         const float value = s.p->shadow[vsh_texel_place(samples.texels[k], SIZE)];
         assert_true(cosine <= 0.15 || value > 0.98f);
         assert_true(cosine >= -0.01 || value == 0.0f);
     }
-    vsh_texels_free(texels);
 }
 
 TEST(an_open_sheet_does_not_shade_itself) {
@@ -176,10 +216,8 @@ TEST(an_open_sheet_does_not_shade_itself) {
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
     FREED_BY(end) stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
-    for (int i = 0; i < TEXELS; ++i) {
-        assert_true(s.p->coverage[i] == 1.0f);
-        assert_true(s.p->shadow[i] == 1.0f);
-    }
+    assert_all_equal(s.p->coverage, TEXELS, 1.0f);
+    assert_all_equal(s.p->shadow, TEXELS, 1.0f);
 }
 
 /* --- How a lightmap is baked: its planes, their errors, threads, options, limits. */
@@ -191,7 +229,8 @@ TEST(irradiance_is_visibility_times_colour_times_cosine_times_ao) {
     light.color[2] = 0.0;
     FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
     bake_stage(&s, &light);
-    planes *p = s.p, *alone = new_planes();
+    const planes *p = s.p;
+    FREED planes *alone = new_planes();
     alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
     bake(s.field, s.charts, &light, &alone->all, NULL, 0);
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -201,14 +240,13 @@ TEST(irradiance_is_visibility_times_colour_times_cosine_times_ao) {
         assert_true(p->irradiance[3 * i + 2] == 0.0f);
         assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * lit) < 1e-5);
     }
-    free(alone);
 }
 
 TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
     FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 2);
     bake_stage(&s, &light);
-    planes *some = new_planes();
+    FREED planes *some = new_planes();
     const vsh_lightmap coverage = {.coverage = some->coverage}, ao = {.ao = some->ao},
                        shadow = {.shadow = some->lights};
     vsh_bake_stats stats = vsh_bake_stats_zero();
@@ -220,22 +258,6 @@ TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
     assert_memory_equal(some->coverage, s.p->coverage, sizeof some->coverage);
     assert_memory_equal(some->ao, s.p->ao, sizeof some->ao);
     assert_memory_equal(some->shadow, s.p->shadow, sizeof some->shadow);
-    free(some);
-}
-
-TEST(any_number_of_threads_gives_the_same_bits) {
-    const vsh_light light = sun(1.0, 0.7, 0.3, 0.2);
-    FREED_BY(end) stage s = begin_floor(1, SIZE, 3, 4);
-    bake(s.field, s.charts, &light, &s.p->all, NULL, 1);
-    static const int32_t threads[] = {2, 5};
-    for (int t = 0; t < 2; ++t) {
-        FREED planes *p = new_planes();
-        bake(s.field, s.charts, &light, &p->all, NULL, threads[t]);
-        assert_memory_equal(p->shadow, s.p->shadow, sizeof p->shadow);
-        assert_memory_equal(p->ao, s.p->ao, sizeof p->ao);
-        assert_memory_equal(p->irradiance, s.p->irradiance, sizeof p->irradiance);
-        assert_memory_equal(p->coverage, s.p->coverage, sizeof p->coverage);
-    }
 }
 
 TEST(bad_options_and_limits_are_reported) {
@@ -249,7 +271,7 @@ TEST(bad_options_and_limits_are_reported) {
                  {1.0, 0.0, 0.05, 1000, VSH_ERROR_LIMIT, ""},
                  {1.0, 0.0, -1.0, 0, VSH_ERROR_ARGUMENT, ""}};
     FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const vsh_light light = sun(1.0, 1.0, 0.0, cases[i].angle);
         vsh_shade_options options = preview_options();
         options.start_offset = cases[i].start_offset;
@@ -265,7 +287,7 @@ TEST(bad_options_and_limits_are_reported) {
 static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_error, float *ao_error) {
     OWNED(vsh_field) *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh();
-    OWNED(vsh_charts) *charts = make_texels(&mesh, 1, SIZE, 2, 4);
+    OWNED(vsh_charts) *charts = charts_of(&mesh, SIZE, 2, 4);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
     vsh_shade_options shade = preview_options();
     shade.method = method;
@@ -283,7 +305,7 @@ TEST(errors_are_baked_where_the_method_knows_them) {
     const vsh_bake_stats stats = bake_errors(VSH_SHADOW_ADAPTIVE, shadow, errors, ao);
     size_t some = 0, none = 0;
     for (size_t i = 0; i < TEXELS; ++i) {
-        /* a mean of standard errors, none of which passes what was asked for by more than its last round */
+        /* a mean of standard errors, each within max_error but for its last round */
         assert_true(errors[i] >= 0.0f && errors[i] <= 0.05f);
         assert_true(ao[i] == 0.0f); /* cones know nothing of it */
         some += errors[i] > 0.0f;
@@ -294,7 +316,270 @@ TEST(errors_are_baked_where_the_method_knows_them) {
     bake_errors(VSH_SHADOW_ADAPTIVE, NULL, alone, NULL); /* without the values */
     assert_memory_equal(errors, alone, sizeof errors);
     bake_errors(VSH_SHADOW_CONE, shadow, errors, NULL);
-    for (size_t i = 0; i < TEXELS; ++i) {
-        assert_true(errors[i] == 0.0f);
+    assert_all_equal(errors, TEXELS, 0.0f);
+}
+
+/* --- padding: texels outside of charts take their nearest neighbour's value */
+
+static const float HOLE = -7.0f; /* the value of unfilled texels alone */
+
+static void fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *states, int32_t padding,
+                 int32_t invalid, float *values, size_t channels) {
+    const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid};
+    const vshi_plane plane = {values, channels};
+    vshi_store store = {.run = run};
+    assert_int_equal(vshi_padding_fill(&store, run, width, height, states, radius, &plane, 1, NULL, NULL),
+                     VSH_OK);
+    vshi_store_close(&store);
+}
+
+/* The definition, texel by texel: index of the source, or -1. */
+static int64_t nearest(int32_t width, int32_t height, const uint8_t *states, int64_t at, int32_t radius) {
+    int64_t best = (int64_t)radius * radius + 1, source = -1;
+    for (int64_t i = 0; i < (int64_t)width * height; ++i) {
+        const int64_t dx = i % width - at % width, dy = i / width - at / width;
+        if (states[i] == VSHI_TEXEL_VALID && dx * dx + dy * dy < best) {
+            best = dx * dx + dy * dy;
+            source = i;
+        }
     }
+    return source;
+}
+
+TEST(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones) {
+    const int32_t sizes[][2] = {{1, 1}, {37, 23}, {130, 70}, {1, 50}, {50, 1}};
+    const int32_t radii[][2] = {{0, 8}, {1, 8}, {2, 0}, {5, 8}, {7, 3}, {4096, 4096}};
+    uint32_t random = 12345;
+    for (size_t s = 0; s < COUNT_OF(sizes); ++s) {
+        const int32_t width = sizes[s][0], height = sizes[s][1];
+        const size_t count = (size_t)width * (size_t)height;
+        FREED uint8_t *states = malloc(count);
+        FREED float *values = malloc(count * sizeof *values);
+        for (size_t r = 0; r < COUNT_OF(radii); ++r) {
+            for (size_t i = 0; i < count; ++i) {
+                random = random * 1664525u + 1013904223u;
+                const uint32_t dice = (random >> 16) % 50;
+                states[i] = dice == 0 ? VSHI_TEXEL_VALID : dice < 10 ? VSHI_TEXEL_INVALID : VSHI_TEXEL_EMPTY;
+                values[i] = states[i] == VSHI_TEXEL_VALID ? (float)i : HOLE;
+            }
+            fill(NULL, width, height, states, radii[r][0], radii[r][1], values, 1);
+            for (size_t i = 0; i < count; ++i) {
+                const int32_t radius = states[i] == VSHI_TEXEL_EMPTY ? radii[r][0] : radii[r][1];
+                const int64_t source = states[i] == VSHI_TEXEL_VALID ? (int64_t)i
+                                       : radius > 0 ? nearest(width, height, states, (int64_t)i, radius)
+                                                    : -1;
+                assert_true(values[i] == (source < 0 ? HOLE : (float)source));
+            }
+        }
+    }
+}
+
+/* A dark texel beside a lit one keeps its value and hands it on, of all channels; the states stays. */
+TEST(dark_texels_are_no_holes_and_all_channels_are_copied) {
+    uint8_t states[16] = {0}, before[16];
+    float values[3 * 16];
+    states[5] = states[6] = VSHI_TEXEL_VALID;
+    states[8] = VSHI_TEXEL_INVALID;
+    memcpy(before, states, sizeof states);
+    for (int i = 0; i < 3 * 16; ++i) {
+        values[i] = i / 3 == 5 ? 0.0f : i / 3 == 6 ? 1.0f + (float)(i % 3) : HOLE;
+    }
+    fill(NULL, 16, 1, states, 3, 8, values, 3);
+    assert_memory_equal(states, before, sizeof states);
+    for (int i = 0; i < 3 * 16; ++i) {
+        const int texel = i / 3;
+        assert_true(values[i] == (texel < 2 || texel > 9 ? HOLE : texel <= 5 ? 0.0f : 1.0f + (float)(i % 3)));
+    }
+}
+
+/* --- Where invalid texels take their values from: within their chart, and how far. */
+
+enum { MOST = 4096, NOWHERE = -1 };
+
+/* A lightmap. A letter is a texel of the mesh of that letter, valid in upper case, invalid in lower case. A
+ * blank is empty. */
+typedef struct map {
+    uint32_t mesh[MOST];
+    uint8_t state[MOST];
+    int from[MOST]; /* the texel that each takes its value from */
+} map;
+
+static map spread_over(size_t width, const char *letters) {
+    static map m;
+    const size_t count = strlen(letters);
+    assert_true(count <= MOST);
+    memset(&m, 0, sizeof m);
+    for (size_t i = 0; i < count; ++i) {
+        const bool empty = letters[i] == ' ', valid = letters[i] < 'a';
+        m.from[i] = NOWHERE;
+        m.state[i] = empty ? VSHI_TEXEL_EMPTY : valid ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+        m.mesh[i] = empty ? 0 : 1 + (uint32_t)(letters[i] - (valid ? 'A' : 'a'));
+    }
+    vshi_spread spread;
+    vshi_store store = {.run = NULL};
+    assert_ok(vshi_spread_find(&store, width, count / width, m.mesh, m.state, &spread, &failure));
+    for (size_t i = 0; i < spread.count; ++i) {
+        assert_int_equal(m.state[spread.texel[i]], VSHI_TEXEL_INVALID);
+        assert_int_equal(m.from[spread.texel[i]], NOWHERE);
+        m.from[spread.texel[i]] = (int)spread.source[i];
+    }
+    vshi_spread_free(&store, &spread);
+    vshi_store_close(&store);
+    return m;
+}
+
+TEST(an_invalid_texel_is_filled_from_at_most_64_texels_away) {
+    char letters[201] = "A";
+    memset(letters + 1, 'a', 199);
+    const map across = spread_over(200, letters), down = spread_over(1, letters);
+    for (int i = 1; i < 200; ++i) {
+        assert_int_equal(across.from[i], i <= 64 ? 0 : NOWHERE);
+        assert_int_equal(down.from[i], i <= 64 ? 0 : NOWHERE);
+    }
+}
+
+TEST(no_texel_is_filled_from_another_chart) {
+    /* another mesh touches; another chart of the same mesh does not */
+    const map m = spread_over(10, "Aaaaaa    "
+                                  "BBBBBB AAA"
+                                  "          "
+                                  "aaaaaaa   ");
+    for (int i = 1; i <= 36; ++i) {
+        assert_true((i > 5 && i < 30) || m.from[i] == (i <= 5 ? 0 : NOWHERE));
+    }
+    /* over two arms of one chart the way goes around, not across */
+    const map arms = spread_over(9, "AAAAAAAA "
+                                    "        A"
+                                    "aaaaaaaa ");
+    assert_int_equal(arms.from[25], 17);
+    assert_int_equal(arms.from[18], 17);
+}
+
+TEST(texels_are_filled_from_the_nearest_valid_one_or_the_first_of_equals) {
+    static const int FROM[21] = {NOWHERE, 0,  0,  0,  6,  6,  NOWHERE, /* */
+                                 0,       0,  0,  0,  6,  6,  6,       /* */
+                                 NOWHERE, 14, 14, 14, 20, 20, NOWHERE};
+    const map m = spread_over(7, "AaaaaaA"
+                                 "aaaaaaa"
+                                 "AaaaaaA");
+    assert_memory_equal(m.from, FROM, sizeof FROM);
+}
+
+TEST(values_are_copied_from_texels_that_have_one) {
+    uint8_t states[4] = {VSHI_TEXEL_VALID, VSHI_TEXEL_INVALID, VSHI_TEXEL_INVALID, VSHI_TEXEL_INVALID};
+    float values[8] = {1.0f, 2.0f, 0.0f, 0.0f, 0.0f, 0.0f, 5.0f, 6.0f};
+    uint32_t texels[2] = {1, 2}, sources[2] = {0, 3}; /* the second one lost its value to a method */
+    const vshi_spread spread = {2, texels, sources};
+    const vshi_plane plane = {values, 2};
+    vshi_spread_copy(&spread, states, &plane, 1);
+    static const float AFTER[8] = {1.0f, 2.0f, 1.0f, 2.0f, 0.0f, 0.0f, 5.0f, 6.0f};
+    assert_memory_equal(values, AFTER, sizeof values);
+    assert_int_equal(states[1], VSHI_TEXEL_FILLED);
+    assert_int_equal(states[2], VSHI_TEXEL_INVALID);
+}
+
+/* --- padding for mip levels: every texel holds a value, and levels hold the means of values alone */
+
+/* A level of a mip map: means of 2 × 2 texels, of those within the image and in `mask`, where there is one.
+ */
+static void halve(size_t width, size_t height, size_t channels, const float *values, const uint8_t *mask,
+                  float *coarse, uint8_t *coarse_mask) {
+    const size_t columns = (width + 1) / 2, rows = (height + 1) / 2;
+    for (size_t i = 0; i < columns * rows * channels; ++i) {
+        const size_t x = i / channels % columns, y = i / channels / columns;
+        float sum = 0.0f;
+        int count = 0;
+        for (size_t k = 0; k < 4; ++k) {
+            const size_t column = 2 * x + k % 2, row = 2 * y + k / 2;
+            if (column < width && row < height && (mask == NULL || mask[row * width + column] != 0)) {
+                sum += values[(row * width + column) * channels + i % channels];
+                ++count;
+            }
+        }
+        coarse[i] = count > 0 ? sum / (float)count : HOLE;
+        if (coarse_mask != NULL) {
+            coarse_mask[i / channels] = count > 0;
+        }
+    }
+}
+
+static void pull_push(int32_t width, int32_t height, uint8_t *mask, float *values, size_t channels) {
+    const vshi_plane plane = {values, channels};
+    vshi_store store = {.run = NULL};
+    assert_int_equal(vshi_pull_push(&store, NULL, width, height, mask, &plane, 1, NULL), VSH_OK);
+    vshi_store_close(&store);
+}
+
+TEST(every_level_holds_the_means_of_values_alone) {
+    const int32_t sizes[][2] = {{64, 64}, {1, 1}, {37, 90}, {128, 16}, {1, 77}, {255, 3}};
+    for (size_t s = 0; s < COUNT_OF(sizes); ++s) {
+        size_t width = (size_t)sizes[s][0], height = (size_t)sizes[s][1], count = width * height;
+        FREED uint8_t *mask = calloc(count, 1), *means_mask = calloc(count, 1), *next_mask = calloc(count, 1);
+        FREED float *filled = malloc(3 * count * sizeof *filled), *means = malloc(3 * count * sizeof *means);
+        FREED float *next = malloc(3 * count * sizeof *next), *given = malloc(3 * count * sizeof *given);
+        uint32_t random = 99;
+        for (size_t i = 0; i < 3 * count; ++i) {
+            random = random * 1664525u + 1013904223u;
+            mask[i / 3] = i == 0 || (i % 3 != 0 ? mask[i / 3] != 0 : random >> 16 < 2500);
+            filled[i] = means[i] = given[i] =
+                mask[i / 3] != 0 ? 1.0f + (float)(random >> 8) * 0x1p-24f : HOLE;
+        }
+        memcpy(means_mask, mask, count);
+        pull_push((int32_t)width, (int32_t)height, mask, filled, 3);
+        for (size_t i = 0; i < 3 * count; ++i) {
+            assert_true(filled[i] >= 1.0f && filled[i] < 2.0f);
+            assert_true(mask[i / 3] == 0 || filled[i] == given[i]);
+        }
+        while (width > 1 || height > 1) {
+            halve(width, height, 3, means, means_mask, next, next_mask);
+            memcpy(means, next, 3 * count * sizeof *means);
+            memcpy(means_mask, next_mask, count);
+            halve(width, height, 3, filled, NULL, next, NULL);
+            memcpy(filled, next, 3 * count * sizeof *filled);
+            width = (width + 1) / 2;
+            height = (height + 1) / 2;
+            for (size_t i = 0; i < 3 * width * height; ++i) {
+                assert_true(filled[i] >= 1.0f && filled[i] < 2.0f);
+                assert_true(means_mask[i / 3] == 0 || fabsf(filled[i] - means[i]) < 1e-5f);
+            }
+        }
+    }
+}
+
+TEST(a_plane_without_values_is_left) {
+    uint8_t mask[12] = {0};
+    float values[12];
+    for (int i = 0; i < 12; ++i) {
+        values[i] = HOLE;
+    }
+    pull_push(4, 3, mask, values, 1);
+    assert_all_equal(values, 12, HOLE);
+}
+
+TEST(a_lightmap_is_filled_to_its_last_corner) {
+    float uvs[8]; /* the floor's chart in a corner of the lightmap */
+    for (int i = 0; i < 8; ++i) {
+        uvs[i] = 0.1f + 0.2f * QUAD_UVS[i];
+    }
+    vsh_mesh mesh = floor_mesh();
+    mesh.uvs = uvs;
+    OWNED(vsh_charts) *charts = charts_of(&mesh, SIZE, 1, VSH_PADDING_AUTO),
+                      *grown = charts_of(&mesh, SIZE, 1, 16);
+    OWNED(vsh_field) *field = floor_field(0);
+    const vsh_light light = sun(0.3, 1.0, 0.2, 0.14);
+    FREED planes *all = new_planes(), *other = new_planes();
+    bake(field, charts, &light, &all->all, NULL, 1);
+    bake(field, grown, &light, &other->all, NULL, 1);
+    size_t beyond = 0;
+    for (size_t i = 0; i < TEXELS; ++i) {
+        assert_true(all->coverage[i] == other->coverage[i]);
+        if (other->ao[i] != 0.0f) { /* within 16 texels nothing else is done */
+            assert_true(all->ao[i] == other->ao[i] && all->shadow[i] == other->shadow[i]);
+            assert_memory_equal(all->irradiance + 3 * i, other->irradiance + 3 * i, 3 * sizeof(float));
+        } else {
+            assert_true(all->ao[i] > 0.0f && all->irradiance[3 * i + 2] > 0.0f);
+            ++beyond;
+        }
+    }
+    assert_true(beyond > TEXELS / 4);
 }

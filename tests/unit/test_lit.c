@@ -1,4 +1,5 @@
 /* A lit asset is the asset with its light: all else comes back byte by byte. */
+#include "base/elementary.h"
 #include "rich_asset.h"
 #include "testing.h"
 
@@ -63,7 +64,7 @@ static size_t list_triangles(const vsh_model *model, const vsh_lit_mesh *lit, in
     return count;
 }
 
-/* What the output shows, read again: each triangle of the model where it was, with the UVs of the atlas. */
+/* The output shows each triangle of the model where it was, with the UVs of the atlas. */
 static void assert_shows(const char *path, const vsh_model *model, const vsh_lit_mesh *lit) {
     static triangle expected[4096], found[4096];
     OWNED(vsh_model) *again = read_model(path);
@@ -89,7 +90,7 @@ TEST(lit_by_their_own_uvs_files_change_in_their_materials_alone) {
                                         VSH_MODELS "/scene.gltf", VSH_MODELS "/scene_draco.glb"};
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
-    for (size_t i = 0; i < sizeof paths / sizeof paths[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(paths); ++i) {
         OWNED(vsh_model) *model = read_model(paths[i]);
         FREED_BY(free_asset)
         asset in = load_asset(paths[i]), out = light_model(paths[i], model, NULL, &options);
@@ -117,7 +118,7 @@ TEST(new_uvs_leave_all_other_accessors_alone) {
         assert_json_equal(made, json_at(copy, "extras/vdbshade_uv_sets"), "sets that were made");
         assert_int_equal(json_object_del(json_at(copy, "extras"), "vdbshade_uv_sets"), 0);
         static const char *const kept[] = {"attributes", "extras", "indices", "targets"};
-        for (size_t k = 0; k < sizeof kept / sizeof kept[0]; ++k) {
+        for (size_t k = 0; k < COUNT_OF(kept); ++k) {
             assert_json_equal(json_object_get(primitive_of(&l.in, 0, 0), kept[k]), json_at(copy, kept[k]),
                               kept[k]);
         }
@@ -155,10 +156,10 @@ TEST(split_vertices_take_all_their_attributes_along) {
     const json_t *old = primitive_of(&l.in, 0, 0);
     const json_t *left = primitive_of(&l.out, number_of(item_of(&l.out, "nodes", 1), "mesh"), 0);
     const json_t *right = primitive_of(&l.out, number_of(item_of(&l.out, "nodes", 2), "mesh"), 0);
-    for (size_t i = 0; i < sizeof attributes / sizeof attributes[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(attributes); ++i) {
         const size_t to = attribute_of(left, attributes[i].name);
         assert_gathered(&l, attribute_of(old, attributes[i].name), to, attributes[i].size);
-        assert_int_equal(attribute_of(right, attributes[i].name), to); /* shared, whoever shows it */
+        assert_int_equal(attribute_of(right, attributes[i].name), to); /* both nodes share it */
     }
     assert_true(attribute_of(left, "TEXCOORD_1") != attribute_of(right, "TEXCOORD_1"));
     assert_int_equal(number_of(left, "indices"), number_of(right, "indices"));
@@ -190,8 +191,8 @@ static void assert_same_floats(const asset *in, const asset *out, size_t accesso
     }
 }
 
-/* Bytes that only replaced vertices had are dropped, where no extension is unknown that may refer to them; no
- * index of what stays changes. */
+/* Bytes of replaced vertices alone are dropped, unless an unknown extension may refer to them. No other index
+ * changes. */
 TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
     size_t sizes[2], accessors[2], image_view = 0;
     for (int known = 0; known < 2; ++known) {
@@ -262,9 +263,8 @@ TEST(instances_become_nodes_where_their_uvs_differ) {
         assert_int_not_equal(attribute_of(primitive, "TEXCOORD_1"),
                              attribute_of(primitive_of(&l.out, number_of(child, "mesh"), 0), "TEXCOORD_1"));
     }
-    char *used = json_dumps(json_at(l.out.root, "extensionsUsed"), 0);
+    FREED char *used = json_dumps(json_at(l.out.root, "extensionsUsed"), 0);
     assert_null(strstr(used, "\"EXT_mesh_gpu_instancing\""));
-    free(used);
     /* by the file's own UVs they stay instances */
     free_lit(l.lit, vsh_model_mesh_count(l.model));
     l.lit = NULL;
@@ -277,7 +277,7 @@ static void put_on_pages(vsh_lit_mesh *lit, size_t count) {
     for (size_t m = 0; m < count; ++m) {
         uint32_t *charts = malloc(lit[m].triangle_count * sizeof *charts);
         for (size_t t = 0; t < lit[m].triangle_count; ++t) {
-            charts[t] = t == 5 ? VSH_LIT_NO_CHART : (uint32_t)(t / 2 % 2);
+            charts[t] = t == 5 ? VSH_NO_CHART : (uint32_t)(t / 2 % 2);
         }
         lit[m].charts = charts;
     }
@@ -323,12 +323,12 @@ TEST(other_formats_become_documents) {
                                         VSH_MODELS "/scene.dae", VSH_MODELS "/figure.fbx"};
     const vsh_lit_image image = white_image(VSH_LIT_PREVIEW, 0);
     const vsh_lit_options options = options_of(&image, 1);
-    for (size_t i = 0; i < 2 * sizeof paths / sizeof paths[0]; ++i) {
-        vsh_model *model = read_model(paths[i / 2]);
+    for (size_t i = 0; i < 2 * COUNT_OF(paths); ++i) {
+        OWNED(vsh_model) *model = read_model(paths[i / 2]);
         vsh_lit_mesh *lit = make_all_lit(model, i % 2 != 0);
         write_lit(paths[i / 2], model, lit, &options, path_of("out.glb").text);
         assert_shows(path_of("out.glb").text, model, lit);
-        vsh_model *again = read_model(path_of("out.glb").text);
+        OWNED(vsh_model) *again = read_model(path_of("out.glb").text);
         assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(model));
         for (size_t m = 0; m < vsh_model_mesh_count(model); ++m) {
             const vsh_mesh one = vsh_model_mesh(model, m, 0), other = vsh_model_mesh(again, m, 0);
@@ -336,30 +336,458 @@ TEST(other_formats_become_documents) {
             assert_int_equal(one.normals != NULL, other.normals != NULL);
             assert_int_equal(one.object, other.object);
         }
-        vsh_model_free(again);
         free_lit(lit, vsh_model_mesh_count(model));
-        vsh_model_free(model);
         remove_file("out.glb");
     }
 }
 
-TEST(compressed_primitives_that_change_are_written_plain) {
+TEST(compressed_primitives_that_change_are_written_plain_by_a_reader_too) {
     static const char path[] = VSH_MODELS "/scene_draco.glb";
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
     OWNED(vsh_model) *model = read_model(path);
     for (int split = 0; split < 2; ++split) {
         vsh_lit_mesh *lit = make_all_lit(model, split != 0);
+        vsh_run run = vsh_run_default();
+        run.reader = "/proc/self/exe";
+        assert_ok(vsh_lit_write(path, model, lit, &options, path_of("out.glb").text, &run, &failure));
+        FREED_BY(free_asset) asset by_reader = load_asset(path_of("out.glb").text);
         write_lit(path, model, lit, &options, path_of("out.glb").text);
         assert_shows(path_of("out.glb").text, model, lit);
-        asset out = load_asset(path_of("out.glb").text);
-        char *text = json_dumps(out.root, 0);
+        FREED_BY(free_asset) asset out = load_asset(path_of("out.glb").text);
+        FREED char *text = json_dumps(out.root, 0);
         assert_null(strstr(text, "draco"));
-        free(text);
-        free_asset(&out);
+        assert_same_asset(&out, &by_reader);
         free_lit(lit, vsh_model_mesh_count(model));
         remove_file("out.glb");
     }
+}
+
+/* --- images and materials: what they hold, where they go, and who shares them */
+
+enum { WIDTH = 7, HEIGHT = 3, TEXELS = WIDTH * HEIGHT };
+
+/* The image of texture `texture`, which lies in the buffer, read again. */
+static vsh_image_file *image_of(const asset *out, size_t texture) {
+    const json_t *image = item_of(out, "images", number_of(item_of(out, "textures", texture), "source"));
+    const size_t view = number_of(image, "bufferView");
+    assert_string_equal(json_string_value(json_object_get(image, "mimeType")), "image/png");
+    write_bytes("image.png", bytes_of_view(out, view),
+                number_of(item_of(out, "bufferViews", view), "byteLength"));
+    vsh_image_file *file = NULL;
+    assert_ok(vsh_image_read(path_of("image.png").text, NULL, &file, &failure));
+    remove_file("image.png");
+    return file;
+}
+
+static void assert_values(const vsh_image_file *file, int32_t channel, const double *expected, double most) {
+    const vsh_image image = vsh_image_view(file);
+    assert_int_equal(image.width, WIDTH);
+    assert_int_equal(image.height, HEIGHT);
+    for (int i = 0; i < TEXELS; ++i) {
+        const double error = fabs((double)image.planes[channel][i] - expected[i]);
+        assert_that(error <= 0.5 / most + 1e-6, "channel %d, texel %d: %.9g, expected %.9g", channel, i,
+                    (double)image.planes[channel][i], expected[i]);
+    }
+}
+
+/* A scene's file, lit by its own UVs. */
+static asset write_scene(const vsh_lit_image *images, size_t count) {
+    static const char path[] = VSH_MODELS "/scene.glb";
+    const vsh_lit_options options = options_of(images, count);
+    OWNED(vsh_model) *model = read_model(path);
+    asset out = light_model(path, model, NULL, &options);
+    return out;
+}
+
+static vsh_lit_image image_with(int32_t purpose, const float *const *channels, int32_t count, int32_t bits,
+                                double intensity) {
+    return (vsh_lit_image){.purpose = purpose,
+                           .width = WIDTH,
+                           .height = HEIGHT,
+                           .channels = channels,
+                           .channel_count = count,
+                           .bits = bits,
+                           .intensity = intensity};
+}
+
+TEST(planes_become_images_of_their_values) {
+    float planes[4][TEXELS]; /* one of grey, three of light up to 5.5 */
+    double expected[4][TEXELS];
+    for (int i = 0; i < TEXELS; ++i) {
+        planes[0][i] = (float)i / (TEXELS - 1);
+        expected[0][i] = (double)planes[0][i];
+        for (int c = 1; c < 4; ++c) {
+            planes[c][i] = (float)(i + c - 1) / 4.0F;
+            expected[c][i] = (double)planes[c][i] / 5.5;
+        }
+    }
+    const float *const views[4] = {planes[0], planes[1], planes[2], planes[3]};
+    for (int32_t bits = 8; bits <= 16; bits += 8) {
+        const double most = bits == 8 ? 255.0 : 65535.0;
+        const vsh_lit_image images[2] = {image_with(VSH_LIT_OCCLUSION, views, 1, bits, 0.0),
+                                         image_with(VSH_LIT_LIGHTMAP, views + 1, 3, bits, 2.0)};
+        FREED_BY(free_asset) asset out = write_scene(images, 2);
+        const json_t *lightmap = json_at(out.root, "materials/0/extensions/MOZ_lightmap");
+        OWNED(vsh_image_file) *file =
+            image_of(&out, number_of(json_at(out.root, "materials/0/occlusionTexture"), "index"));
+        assert_values(file, 0, expected[0], most);
+        /* light over 1 is in the intensity */
+        assert_true(json_number_value(json_object_get(lightmap, "intensity")) == 2.0 * 5.5);
+        OWNED(vsh_image_file) *lit = image_of(&out, number_of(lightmap, "index"));
+        for (int c = 0; c < 3; ++c) {
+            assert_values(lit, c, expected[1 + c], most);
+        }
+    }
+}
+
+TEST(previews_are_unlit_base_colour_of_srgb) {
+    float grey[TEXELS];
+    double expected[TEXELS];
+    for (int i = 0; i < TEXELS; ++i) {
+        grey[i] = i == 3 ? NAN : i == 4 ? -1.0F : 2.0F * (float)i / (TEXELS - 1);
+        expected[i] = i == 3 || i == 4 ? 0.0 : vshi_to_srgb(fmin(0.75 * (double)grey[i], 1.0));
+    }
+    const float *const one[1] = {grey};
+    const vsh_lit_image image = image_with(VSH_LIT_PREVIEW, one, 1, 0, 0.75);
+    FREED_BY(free_asset) asset out = write_scene(&image, 1);
+    assert_non_null(json_at(out.root, "materials/0/extensions/KHR_materials_unlit"));
+    const json_t *base = json_at(out.root, "materials/0/pbrMetallicRoughness/baseColorTexture");
+    assert_int_equal(number_of(base, "texCoord"), 1);
+    OWNED(vsh_image_file) *file = image_of(&out, number_of(base, "index"));
+    assert_values(file, 0, expected, 255.0);
+}
+
+/* --- materials */
+
+TEST(materials_are_copied_only_where_needed) {
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), false);
+    light_white(&l, VSH_LIT_OCCLUSION);
+    /* Three materials as they were, because unlit primitives show them too. Copies: tiles for UV set 1, leaf
+     * for sets 0 and 1, rail for set 0; and white for set 1. */
+    assert_int_equal(count_of(&l.out, "materials"), 3 + 1 + 2 + 1 + 1);
+    for (size_t m = 0; m < 3; ++m) { /* all are shown unlit as well */
+        assert_json_equal(item_of(&l.in, "materials", m), item_of(&l.out, "materials", m), "a material");
+    }
+    /* left and right share theirs */
+    size_t shared[2];
+    for (size_t node = 1; node < 3; ++node) {
+        const json_t *primitive = primitive_of(&l.out, number_of(item_of(&l.out, "nodes", node), "mesh"), 0);
+        shared[node - 1] = number_of(primitive, "material");
+        const json_t *variants =
+            json_object_get(json_object_get(primitive, "extensions"), "KHR_materials_variants");
+        const json_t *mappings = json_object_get(variants, "mappings");
+        assert_int_equal(number_of(json_array_get(mappings, 0), "material"), shared[0]);
+        const json_t *night =
+            item_of(&l.out, "materials", number_of(json_array_get(mappings, 1), "material"));
+        assert_string_equal(json_string_value(json_object_get(night, "name")), "leaf");
+        assert_int_equal(number_of(json_object_get(night, "occlusionTexture"), "texCoord"), 1);
+    }
+    assert_int_equal(shared[0], shared[1]);
+    /* without the other scene's node and the points, they change where they are */
+    json_array_remove(list_of(&l.in, "scenes"), 1);
+    json_array_set_new(list_of(&l.in, "nodes"), 8, parsed("{\"name\":\"empty\"}"));
+    json_array_remove(json_at(l.in.root, "meshes/3/primitives"), 1);
+    write_glb(&l.in, "in.glb");
+    light_white(&l, VSH_LIT_OCCLUSION);
+    assert_int_equal(count_of(&l.out, "materials"), 3 + 1 + 1);
+    for (size_t m = 0; m < 3; ++m) {
+        assert_non_null(json_object_get(item_of(&l.out, "materials", m), "occlusionTexture"));
+    }
+}
+
+TEST(cut_out_materials_have_no_preview) {
+    asset in = make_rich();
+    set_at(&in, "materials/0", "alphaMode", json_string("MASK"));
+    FREED_BY(end_lighting) lighting l = begin_lighting(in, false);
+    light_white(&l, VSH_LIT_PREVIEW);
+    for (size_t m = 0; m < count_of(&l.out, "materials"); ++m) {
+        const json_t *material = item_of(&l.out, "materials", m);
+        const char *name = json_string_value(json_object_get(material, "name"));
+        if (name != NULL && strcmp(name, "tiles") == 0) {
+            assert_json_equal(item_of(&in, "materials", 0), material, "tiles");
+        }
+    }
+}
+
+/* --- where they go */
+
+TEST(images_go_beside_a_gltf_with_its_buffer) {
+    static const uint32_t pages[2] = {0, 1};
+    FREED_BY(end_lighting) lighting l = begin_lighting(make_rich(), false);
+    l.lit[0].page = 1;
+    const vsh_lit_image images[2] = {white_image(VSH_LIT_LIGHTMAP, 0), white_image(VSH_LIT_LIGHTMAP, 1)};
+    vsh_lit_options options = options_of(images, 2);
+    options.chart_pages = pages;
+    options.chart_count = 2;
+    write_lit(path_of("in.glb").text, l.model, l.lit, &options, path_of("a b.gltf").text);
+    l.out = load_asset(path_of("a b.gltf").text);
+    assert_string_equal(text_at(&l.out, "buffers/0/uri"), "a%20b.bin");
+    assert_string_equal(text_at(&l.out, "buffers/0/name"), "all");
+    assert_string_equal(text_at(&l.out, "images/1/uri"), "a%20b.lightmap.0.png");
+    assert_string_equal(text_at(&l.out, "images/2/uri"), "a%20b.lightmap.1.png");
+    assert_views_kept(&l.in, &l.out);
+    static const char *const written[] = {"a b.lightmap.0.png", "a b.lightmap.1.png"};
+    for (size_t i = 0; i < 2; ++i) {
+        assert_file(written[i], white_png, sizeof white_png);
+        remove_file(written[i]);
+    }
+    /* and it can be read again */
+    OWNED(vsh_model) *again = read_model(path_of("a b.gltf").text);
+    assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(l.model));
+    remove_file("a b.gltf");
+    remove_file("a b.bin");
+}
+
+TEST(images_are_copied_into_another_folder) {
+    asset in = make_rich();
+    put_item(&in, "images", parsed("{\"uri\":\"gone.png\"}"));
+    put_item(&in, "images", parsed("{\"uri\":\"link.png\"}"));
+    put_item(&in, "images", parsed("{\"uri\":\"https://a.b/c.png\"}"));
+    assert_int_equal(symlink("/etc/passwd", path_of("link.png").text), 0);
+    assert_int_equal(mkdir(path_of("other").text, 0777), 0);
+    FREED_BY(end_lighting) lighting l = begin_lighting(in, false);
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    warnings[0] = '\0';
+    assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, NULL, NULL, path_of("other/out.glb").text, &run,
+                            &failure));
+    l.out = load_asset(path_of("other/out.glb").text);
+    assert_null(text_at(&l.out, "images/0/uri"));
+    assert_string_equal(text_at(&l.out, "images/0/name"), "tile");
+    assert_memory_equal(bytes_of_view(&l.out, number_of(item_of(&l.out, "images", 0), "bufferView")),
+                        white_png, sizeof white_png);
+    for (size_t i = 1; i < 4; ++i) { /* images that cannot be read stay as they were */
+        assert_json_equal(item_of(&in, "images", i), item_of(&l.out, "images", i), "an image");
+    }
+    assert_non_null(strstr(warnings, "gone.png"));
+    assert_non_null(strstr(warnings, "outside of the model's folder"));
+    remove_file("other/out.glb");
+    assert_int_equal(rmdir(path_of("other").text), 0);
+    remove_file("link.png");
+}
+
+/* --- assets that are lit again: the next bake replaces what this one made, and nothing else */
+
+enum { LIGHTMAP = 1 << VSH_LIT_LIGHTMAP, OCCLUSION = 1 << VSH_LIT_OCCLUSION, LISTS = 6 };
+
+static const char *const lists[LISTS] = {"textures",    "images",    "samplers",
+                                         "bufferViews", "accessors", "materials"};
+
+/* A scene with a texture that it shows and one that it does not: the glass's. */
+static asset make_scene(void) {
+    asset a = load_asset(VSH_MODELS "/scene.glb");
+    for (int i = 0; i < 2; ++i) {
+        const int view = put_view(&a, white_png, sizeof white_png, 0, 0);
+        put_item(&a, "images", json_pack("{s:i,s:s}", "bufferView", view, "mimeType", "image/png"));
+    }
+    put_item(&a, "samplers", parsed("{\"wrapS\":10497}"));
+    put_item(&a, "textures", parsed("{\"source\":0,\"sampler\":0}"));
+    put_item(&a, "textures", parsed("{\"source\":1}"));
+    set_at(&a, "materials/1", "occlusionTexture", parsed("{\"index\":0}"));
+    set_at(&a, "buffers/0", "byteLength", json_integer((json_int_t)a.size));
+    return a;
+}
+
+/* Lights a file, whose first object may be on a page of its own. */
+static void light_file(const char *in, int purposes, uint32_t pages, int32_t place, const char *out,
+                       const vsh_run *run) {
+    OWNED(vsh_model) *model = read_model(path_of(in).text);
+    vsh_lit_mesh *lit = make_all_lit(model, true);
+    lit[0].page = pages - 1;
+    vsh_lit_image images[4];
+    size_t count = 0;
+    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
+        for (uint32_t page = 0; page < pages && (purposes >> purpose & 1) != 0; ++page) {
+            images[count++] = white_image(purpose, page);
+        }
+    }
+    vsh_lit_options options = options_of(images, count);
+    options.image_place = place;
+    assert_ok(vsh_lit_write(path_of(in).text, model, lit, &options, path_of(out).text, run, &failure));
+    keep_file(path_of(out).text);
+    free_lit(lit, vsh_model_mesh_count(model));
+}
+
+static asset light_again(const asset *in, int purposes, uint32_t pages) {
+    write_glb(in, "in.glb");
+    light_file("in.glb", purposes, pages, VSH_LIT_IMAGES_EMBED, "out.glb", NULL);
+    asset out = load_asset(path_of("out.glb").text);
+    remove_file("in.glb");
+    remove_file("out.glb");
+    return out;
+}
+
+/* The scene's own textures, samplers and images are where they were. */
+static void assert_own_kept(const asset *in, const asset *out) {
+    assert_list_kept(in, out, "textures", "");
+    assert_list_kept(in, out, "samplers", "");
+    assert_list_kept(in, out, "images", "bufferView");
+    for (size_t i = 0; i < 2; ++i) {
+        const size_t view = number_of(item_of(out, "images", i), "bufferView");
+        assert_memory_equal(bytes_of_view(out, view), white_png, sizeof white_png);
+    }
+}
+
+static void assert_counts(const asset *a, const asset *b, size_t list_count) {
+    for (size_t k = 0; k < list_count; ++k) {
+        assert_int_equal(count_of(a, lists[k]), count_of(b, lists[k]));
+    }
+}
+
+/* Every material leads to the texture, image and sampler of each purpose. */
+static void assert_shown(const asset *out, int purposes) {
+    static const struct {
+        const char *name, *info;
+    } shown[] = {[VSH_LIT_OCCLUSION] = {"occlusion", "occlusionTexture"},
+                 [VSH_LIT_LIGHTMAP] = {"lightmap", "extensions/MOZ_lightmap"}};
+    for (size_t m = 0; m < count_of(out, "materials"); ++m) {
+        json_t *material = json_array_get(list_of(out, "materials"), m);
+        for (int purpose = 0; purpose < 2; ++purpose) {
+            if ((purposes >> purpose & 1) == 0) {
+                continue;
+            }
+            const json_t *info = json_at(material, shown[purpose].info);
+            const json_t *texture = item_of(out, "textures", number_of(info, "index"));
+            const json_t *image = item_of(out, "images", number_of(texture, "source"));
+            const json_t *sampler = item_of(out, "samplers", number_of(texture, "sampler"));
+            assert_string_equal(json_string_value(json_object_get(image, "name")), shown[purpose].name);
+            assert_int_equal(number_of(sampler, "wrapS"), 33071);
+            assert_memory_equal(bytes_of_view(out, number_of(image, "bufferView")), white_png,
+                                sizeof white_png);
+        }
+    }
+}
+
+TEST(a_bake_replaces_the_images_of_the_last_one) {
+    FREED_BY(free_asset) asset in = make_scene(), one = light_again(&in, OCCLUSION | LIGHTMAP, 1);
+    assert_own_kept(&in, &one);
+    assert_shown(&one, OCCLUSION | LIGHTMAP);
+    assert_int_equal(count_of(&one, "textures"), 4);
+    FREED_BY(free_asset) asset last = light_again(&one, OCCLUSION | LIGHTMAP, 1);
+    for (int i = 0; i < 3; ++i) {
+        asset again = light_again(&last, OCCLUSION | LIGHTMAP, 1);
+        assert_own_kept(&in, &again);
+        assert_shown(&again, OCCLUSION | LIGHTMAP);
+        assert_counts(&one, &again, LISTS);
+        assert_int_equal(one.size, again.size);
+        assert_same_asset(&last, &again);
+        free_asset(&last);
+        last = again;
+    }
+}
+
+TEST(fewer_pages_leave_fewer_textures) {
+    FREED_BY(free_asset) asset in = make_scene(), two = light_again(&in, OCCLUSION | LIGHTMAP, 2);
+    FREED_BY(free_asset) asset one = light_again(&in, OCCLUSION | LIGHTMAP, 1);
+    assert_int_equal(count_of(&two, "textures"), 6);
+    FREED_BY(free_asset)
+    asset less = light_again(&two, OCCLUSION | LIGHTMAP, 1),
+          more = light_again(&one, OCCLUSION | LIGHTMAP, 2);
+    assert_counts(&less, &one, 3);
+    assert_counts(&more, &two, 3);
+    assert_own_kept(&in, &less);
+    assert_own_kept(&in, &more);
+    assert_shown(&less, OCCLUSION | LIGHTMAP);
+    /* a lightmap that is not baked again stays, with what shows it */
+    FREED_BY(free_asset) asset ao = light_again(&one, OCCLUSION, 1);
+    assert_int_equal(count_of(&ao, "textures"), 4);
+    assert_own_kept(&in, &ao);
+    assert_shown(&ao, OCCLUSION | LIGHTMAP);
+}
+
+TEST(textures_of_others_stay) {
+    FREED_BY(free_asset) asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
+    const json_int_t image = (json_int_t)number_of(item_of(&one, "textures", 2), "source");
+    /* a stranger's, with the same image */
+    put_item(&one, "extensionsUsed", json_string("EXT_texture_avif"));
+    put_item(&one, "textures", json_pack("{s:{s:{s:I}}}", "extensions", "EXT_texture_avif", "source", image));
+    FREED_BY(free_asset) asset two = light_again(&one, LIGHTMAP, 1);
+    assert_int_equal(count_of(&two, "textures"), 4);
+    assert_int_equal(count_of(&two, "images"), 4);
+    assert_list_kept(&one, &two, "textures", "source");
+    assert_list_kept(&one, &two, "samplers", "");
+    assert_int_equal(number_of(item_of(&two, "textures", 2), "source"), image + 1);
+    assert_json_equal(item_of(&one, "textures", 3), item_of(&two, "textures", 3), "a texture");
+    /* one that nothing shows, though it says that it was made */
+    put_item(&two, "textures", json_deep_copy(item_of(&two, "textures", 2)));
+    FREED_BY(free_asset) asset three = light_again(&two, LIGHTMAP, 1);
+    assert_int_equal(count_of(&three, "textures"), 5);
+    assert_json_equal(item_of(&two, "textures", 4), item_of(&three, "textures", 4), "a texture");
+    assert_int_equal(count_of(&three, "images"), 5);
+    assert_int_equal(count_of(&three, "samplers"), 3);
+    assert_int_equal(number_of(item_of(&three, "textures", 2), "sampler"), 2);
+    /* a mark that is gone */
+    json_object_del(json_at(three.root, "textures/2"), "extras");
+    FREED_BY(free_asset) asset four = light_again(&three, LIGHTMAP, 1);
+    assert_list_kept(&three, &four, "textures", "");
+    assert_int_equal(count_of(&four, "textures"), 6);
+}
+
+/* Bytes that pad an image to a multiple of 8 go with it, unless other data begins there. */
+TEST(data_behind_the_images_of_a_bake_stays) {
+    static const unsigned char bytes[12] = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+    FREED_BY(free_asset) asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
+    const json_t *last = item_of(&one, "bufferViews", count_of(&one, "bufferViews") - 1);
+    assert_int_equal(number_of(last, "byteLength"), sizeof white_png);
+    one.size = number_of(last, "byteOffset") + sizeof white_png;
+    const size_t view = (size_t)put_view(&one, bytes, sizeof bytes, 0, 0);
+    assert_int_equal(number_of(item_of(&one, "bufferViews", view), "byteOffset") % 8, 4);
+    put_accessor(&one, (int)view, 0, 5125, 3, "SCALAR", "");
+    set_at(&one, "buffers/0", "byteLength", json_integer((json_int_t)one.size));
+    FREED_BY(free_asset) asset two = light_again(&one, LIGHTMAP, 1);
+    assert_memory_equal(bytes_of_view(&two, view), bytes, sizeof bytes);
+}
+
+TEST(beside_an_extension_that_is_not_known_all_stays) {
+    FREED_BY(free_asset) asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
+    put_item(&one, "extensionsUsed", json_string("VENDOR_skylights"));
+    set_at(&one, "", "extensions", parsed("{\"VENDOR_skylights\":{\"texture\":2}}"));
+    FREED_BY(free_asset) asset two = light_again(&one, LIGHTMAP, 1);
+    assert_list_kept(&one, &two, "textures", "");
+    assert_list_kept(&one, &two, "images", "");
+    assert_int_equal(count_of(&two, "textures"), count_of(&one, "textures") + 1);
+}
+
+/* A number of another list, in a material of an extension that is known by its beginning. */
+TEST(numbers_in_extensions_of_materials_stay) {
+    FREED_BY(free_asset) asset in = make_scene(), one = light_again(&in, LIGHTMAP, 1);
+    put_item(&one, "extensionsUsed", json_string("KHR_materials_woven"));
+    set_at(&one, "materials/0/extensions", "KHR_materials_woven", parsed("{\"weave\":{\"index\":3}}"));
+    FREED_BY(free_asset) asset two = light_again(&one, LIGHTMAP, 1);
+    assert_int_equal(count_of(&two, "textures"), 3);
+    assert_json_equal(json_at(one.root, "materials/0/extensions/KHR_materials_woven"),
+                      json_at(two.root, "materials/0/extensions/KHR_materials_woven"), "an extension");
+}
+
+TEST(files_that_were_made_are_left_and_no_longer_named) {
+    FREED_BY(free_asset) asset in = make_scene();
+    write_glb(&in, "in.glb");
+    light_file("in.glb", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "lit.gltf", NULL);
+    FREED_BY(free_asset) asset one = load_asset(path_of("lit.gltf").text);
+    light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "again.gltf", NULL);
+    FREED_BY(free_asset) asset two = load_asset(path_of("again.gltf").text);
+    assert_counts(&one, &two, LISTS);
+    assert_string_equal(text_at(&two, "images/2/uri"), "again.lightmap.png");
+    assert_int_equal(one.size, two.size);
+    remove_file("lit.lightmap.png"); /* which is there */
+    /* images that go are neither copied nor missed */
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    warnings[0] = '\0';
+    assert_int_equal(mkdir(path_of("other").text, 0777), 0);
+    light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "other/lit.gltf", &run);
+    assert_string_equal(warnings, "");
+    FREED_BY(free_asset) asset far = load_asset(path_of("other/lit.gltf").text);
+    assert_string_equal(text_at(&far, "images/2/uri"), "lit.lightmap.png");
+    assert_int_equal(far.size, one.size);
+    static const char *const left[] = {"in.glb",         "lit.gltf",      "lit.bin",
+                                       "again.gltf",     "again.bin",     "again.lightmap.png",
+                                       "other/lit.gltf", "other/lit.bin", "other/lit.lightmap.png"};
+    for (size_t i = 0; i < COUNT_OF(left); ++i) {
+        remove_file(left[i]);
+    }
+    assert_int_equal(rmdir(path_of("other").text), 0);
 }
 
 FIXTURE(make_folder, remove_folder)

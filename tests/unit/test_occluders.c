@@ -1,5 +1,7 @@
-/* What casts as one handle: from meshes, from parts and from a scene. */
+/* Occluders from meshes, from parts and from a scene. */
+#include "field/field.h"
 #include "fields.h"
+#include "previews.h"
 #include "scenes.h"
 #include "shading.h"
 #include "testing.h"
@@ -20,9 +22,7 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     vsh_grid *grid = NULL;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &failure));
     OWNED(vsh_field) *field = field_of_grid(grid, options.reach);
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(made, &parts);
-    assert_int_equal(parts.struct_size, sizeof parts);
+    const vshi_occluder_parts parts = parts_of(made);
     assert_non_null(parts.triangles);
     assert_ptr_equal(parts.triangles, parts.true_triangles);
     uint64_t counter = 7;
@@ -63,7 +63,7 @@ TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
                  {8, 1, &coarse, NULL, VSH_ERROR_ARGUMENT},
                  {8, 1, &behind, NULL, VSH_ERROR_ARGUMENT},
                  {8, 1, NULL, &run, VSH_ERROR_LIMIT}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         vsh_mesh mesh = plate();
         mesh.vertex_count = cases[i].vertex_count;
         vsh_occluders *made = (vsh_occluders *)&failure;
@@ -74,54 +74,56 @@ TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
     }
 }
 
-static void expect_refused(const vsh_occluder_parts *parts, const char *text) {
+static vshi_spheres *unit_sphere(void) {
+    static const double ball[] = {0, 0, 0, 1};
+    vshi_spheres *spheres = NULL;
+    assert_ok(vshi_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
+    return spheres;
+}
+
+static void expect_refused(const vshi_occluder_parts *parts, const char *text) {
     vsh_occluders *made = (vsh_occluders *)&failure;
-    assert_fails(vsh_occluders_from_parts(parts, &made, &failure), VSH_ERROR_ARGUMENT, text);
+    assert_fails(vshi_occluders_from_parts(parts, &made, &failure), VSH_ERROR_ARGUMENT, text);
     assert_null(made);
 }
 
-TEST(parts_that_are_none_are_refused_by_name) {
-    const double ball[] = {0, 0, 0, 1};
-    OWNED(vsh_spheres) *spheres = NULL;
-    assert_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
+TEST(bad_parts_of_occluders_are_refused_by_name) {
+    OWNED(vshi_spheres) *spheres = unit_sphere();
+    vshi_occluder_parts parts = {.field = NULL};
     expect_refused(&parts, "neither a field nor triangles nor layers");
     parts.voxel_size = -1.0;
     expect_refused(&parts, "voxel_size");
-    parts = vsh_occluder_parts_default();
+    parts = (vshi_occluder_parts){.field = NULL};
     parts.layer_count = (size_t)1 << 40; /* is no reason to ask for memory */
     expect_refused(&parts, "1099511627776 layers at NULL: expected at most 128");
-    vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
+    vshi_layer layers[2] = {vshi_layer_default(), vshi_layer_default()};
     layers[0].spheres = spheres;
     parts.layers = layers;
-    parts.layer_count = VSH_MAX_LAYERS + 1;
+    parts.layer_count = VSHI_MAX_LAYERS + 1;
     expect_refused(&parts, "expected at most 128");
     parts.layer_count = 2;
     expect_refused(&parts, "layer 1: none of field, heights and spheres");
 }
 
-TEST(layers_alone_say_what_offsets_are_measured_in) {
-    const double ball[] = {0, 0, 0, 1};
-    OWNED(vsh_spheres) *spheres = NULL;
-    assert_ok(vsh_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
+TEST(layers_without_a_field_define_the_unit_of_offsets) {
+    OWNED(vshi_spheres) *spheres = unit_sphere();
     const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     OWNED(vsh_field) *field = field_of((truth_scene){&solid, 1}, 0.125, 1.0);
-    vsh_layer layers[2] = {vsh_layer_default(), vsh_layer_default()};
+    vshi_layer layers[2] = {vshi_layer_default(), vshi_layer_default()};
     layers[0].spheres = spheres;
     layers[1].field = field;
     const struct {
         size_t layers;
         double given, expected;
     } cases[] = {{1, 0.0, 2e-5}, {2, 0.0, 0.125}, {2, 0.5, 0.5}, {0, 3.0, 3.0}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
-        vsh_occluder_parts parts = vsh_occluder_parts_default();
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        vshi_occluder_parts parts = {.field = NULL};
         parts.layers = layers;
         parts.layer_count = cases[i].layers;
         parts.voxel_size = cases[i].given;
         OWNED(vsh_occluders) *made = NULL;
-        assert_ok(vsh_occluders_from_parts(&parts, &made, &failure));
-        vsh_occluder_parts views;
-        vsh_occluders_get_parts(made, &views);
+        assert_ok(vshi_occluders_from_parts(&parts, &made, &failure));
+        const vshi_occluder_parts views = parts_of(made);
         assert_int_equal(views.layer_count, cases[i].layers);
         vsh_field_info info;
         vsh_field_get_info(views.field, &info);
@@ -134,17 +136,16 @@ TEST(layers_alone_say_what_offsets_are_measured_in) {
 }
 
 TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
-    const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
+    static const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     vsh_grid *grid = grid_of((truth_scene){&solid, 1}, 0.125);
-    vsh_field_options options = vsh_field_options_default();
+    vsh_occluders_options options = vsh_occluders_options_default();
     options.reach = -1.0;
     OWNED(vsh_occluders) *made = (vsh_occluders *)&failure;
     assert_fails(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
     assert_null(made);
     options.reach = 3.0;
     assert_ok(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure));
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(made, &parts);
+    const vshi_occluder_parts parts = parts_of(made);
     assert_true(parts.triangles == NULL && parts.layer_count == 0);
     OWNED(vsh_field) *field = field_of_grid(grid, 3.0);
     vsh_field_info ours, theirs;
@@ -194,10 +195,6 @@ static vsh_occluders *of_scene(const char *text, const vsh_scene_occluders_optio
     vsh_occluders *made = NULL;
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     assert_int_equal(vsh_scene_occluders(scene, assets, options, NULL, &made, &failure), expected);
-    vsh_occluders_info info;
-    if (made != NULL) { /* no layer of these scenes refers to scene or assets */
-        vsh_occluders_get_info(made, &info);
-    }
     return made;
 }
 
@@ -215,11 +212,10 @@ TEST(a_scene_keeps_the_truth_only_where_an_error_is_kept) {
     } cases[] = {{SCENE(BALL, "\"method\": \"adaptive\""), 1, true},
                  {SCENE(BALL, "\"method\": \"adaptive\""), 0, false},
                  {SCENE(BALL, "\"method\": \"cone\""), 1, false}};
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         options.truth = cases[i].truth;
         OWNED(vsh_occluders) *made = of_scene(cases[i].text, &options, VSH_OK);
-        vsh_occluder_parts parts;
-        vsh_occluders_get_parts(made, &parts);
+        const vshi_occluder_parts parts = parts_of(made);
         assert_int_equal(parts.true_solids != NULL, cases[i].kept);
         assert_null(parts.true_triangles);
         assert_null(parts.triangles);
@@ -230,8 +226,8 @@ TEST(a_scene_keeps_the_truth_only_where_an_error_is_kept) {
 
 TEST(more_layers_than_can_be_are_refused) {
     const double ball[4] = {0, 0, 0, 1};
-    vsh_caster casters[VSH_MAX_LAYERS + 1] = {{.type = VSH_CASTER_SPHERES}};
-    for (size_t i = 0; i <= VSH_MAX_LAYERS; ++i) {
+    vsh_caster casters[VSHI_MAX_LAYERS + 1] = {{.type = VSH_CASTER_SPHERES}};
+    for (size_t i = 0; i <= VSHI_MAX_LAYERS; ++i) {
         casters[i] = (vsh_caster){.type = VSH_CASTER_SPHERES, .spheres = ball, .sphere_count = 1};
         casters[i].transform[0] = casters[i].transform[5] = casters[i].transform[10] = 1.0;
     }
@@ -244,7 +240,7 @@ TEST(more_layers_than_can_be_are_refused) {
                        .light_count = 1};
     scene.shade.method = VSH_SHADOW_HARD;
     for (size_t more = 0; more < 2; ++more) {
-        scene.caster_count = VSH_MAX_LAYERS + more;
+        scene.caster_count = VSHI_MAX_LAYERS + more;
         OWNED(vsh_assets) *assets = NULL;
         OWNED(vsh_occluders) *made = NULL;
         assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
@@ -255,7 +251,7 @@ TEST(more_layers_than_can_be_are_refused) {
                         "0 layers and 129 casters that are not voxelised: at most 128 together");
 }
 
-TEST(a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named) {
+TEST(default_transforms_are_the_identity_and_zeroed_ones_are_refused) {
     enum { COUNT = 2 };
     vsh_caster casters[COUNT] = {vsh_caster_default(), vsh_caster_default()};
     vsh_receiver receiver = vsh_receiver_default();
@@ -279,7 +275,7 @@ TEST(a_default_caster_stands_where_its_file_says_and_a_zeroed_transform_is_named
          "identity"},
         {&casters[0].transform[3], NAN, "casters[0].transform[3] is nan: expected a finite number"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const double before = *cases[i].at;
         *cases[i].at = cases[i].value;
         assert_int_equal(vsh_assets_load(&scene, NULL, &assets, &failure), VSH_ERROR_ARGUMENT);
@@ -295,7 +291,7 @@ static void count_lost(void *user, const char *message) {
     *(int *)user += strstr(message, "and casts nothing") != NULL;
 }
 
-TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
+TEST(casters_that_voxels_lose_get_a_warning_where_voxels_decide) {
     static const struct {
         int32_t method, silent;
         bool told;
@@ -312,7 +308,7 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
     scene.grid.resolution = 32;
     OWNED(vsh_assets) *assets = NULL;
     assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));
-    for (size_t i = 0; i < sizeof cases / sizeof *cases; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         int told = 0;
         vsh_run run = vsh_run_default();
         run.warning = count_lost;
@@ -325,3 +321,304 @@ TEST(what_voxels_lose_is_told_where_they_decide_unless_they_are_a_trial) {
         assert_int_equal(told > 0, cases[i].told);
     }
 }
+
+/* --- layers beside the field: what they hide, and how it is combined */
+
+enum { SIZE = 64, COUNT = SIZE * SIZE };
+
+/* The seeds' floor; its solids one by one, and all of them. */
+static const double towards[3] = {-0.5, 0.6, -0.6};
+static double positions[3 * COUNT];
+static float normals[3 * COUNT];
+
+static truth_solid ball(double x, double y, double z, double radius) {
+    return (truth_solid){.shape = TRUTH_SPHERE, .center = {x, y, z}, .radius = radius};
+}
+
+static vsh_field *field_of_ball(double x, double y, double z, double radius, double voxel) {
+    const truth_solid solid = ball(x, y, z, radius);
+    return field_of((truth_scene){&solid, 1}, voxel, 4.0);
+}
+
+static void shade(const vsh_occluders *occluders, const vsh_light *light, int32_t method, float *values,
+                  float *deviation) {
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    vsh_shade_options options = preview_options();
+    options.method = method;
+    shade_points(occluders, &points, light, &options, NULL, values, deviation);
+}
+
+/* By one cone a point. */
+static void shade_plainly(const vsh_occluders *occluders, const vsh_light *light, float *values) {
+    shade(occluders, light, VSH_SHADOW_CONE, values, NULL);
+}
+
+static void shade_ao(const vsh_occluders *occluders, float *values) {
+    const vsh_points points = {COUNT, positions, normals, NULL};
+    const vsh_shade_options options = preview_options();
+    shade_ao_points(occluders, &points, &options, NULL, values);
+}
+
+static void assert_all(const float *values, double expected, double tolerance) {
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(values[i], expected, tolerance);
+    }
+}
+
+static float least_of(const float *values) {
+    float least = 1.0f;
+    for (size_t i = 0; i < COUNT; ++i) {
+        least = fminf(least, values[i]);
+    }
+    return least;
+}
+
+static void assert_same(const float *values, const float *others, double tolerance) {
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_float_equal(values[i], others[i], tolerance);
+    }
+}
+
+static vshi_layer layer_of(const vsh_field *field) {
+    vshi_layer layer = vshi_layer_default();
+    layer.field = field;
+    return layer;
+}
+
+TEST(where_nothing_casts_all_light_arrives_that_the_horizon_lets_through) {
+    OWNED(vsh_field) *empty = field_of_nothing(0.05);
+    const vsh_light above = sun(towards, 0.2);
+    const vsh_light low = sun((const double[]){1.0, 0.0, 0.0}, 0.2); /* half of it below the horizon */
+    float values[COUNT];
+    const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE, VSH_SHADOW_RAYS,
+                               VSH_SHADOW_ADAPTIVE};
+    for (size_t m = 0; m < COUNT_OF(methods); ++m) {
+        shade(occluders_of(empty), &above, methods[m], values, NULL);
+        assert_all(values, 1.0, 0.0);
+        if (methods[m] != VSH_SHADOW_HARD) {
+            shade(occluders_of(empty), &low, methods[m], values, NULL);
+            assert_all(values, 0.5, 0.05);
+        }
+    }
+    shade_ao(occluders_of(empty), values);
+    assert_all(values, 1.0, 1e-6);
+}
+
+/* Light from so low that the horizon cuts into it, which is not to count twice. */
+TEST(a_layer_over_nothing_is_as_the_field_itself) {
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = field_of_nothing(0.05);
+    const vshi_layer layer = layer_of(field);
+    const vsh_light lights[2] = {sun(towards, 0.2), sun((const double[]){1.0, 0.05, 0.2}, 0.2)};
+    float alone[COUNT], layered[COUNT];
+    for (int l = 0; l < 2; ++l) {
+        shade_plainly(occluders_of(field), &lights[l], alone);
+        shade_plainly(occluders_with(empty, &layer, 1), &lights[l], layered);
+        assert_same(layered, alone, 2e-6);
+        assert_true(least_of(layered) < 0.8f);
+    }
+}
+
+/* Two balls whose shadows do not meet: the product of their layers is the shadow of both. The truth is the
+ * union in one field. Where their discs overlap in the sky, the product is that of independent shares. */
+TEST(layers_whose_shadows_do_not_meet_shade_like_their_union) {
+    OWNED(vsh_field) *a = field_of_ball(-1.0, 0.6, -0.6, 0.3, 0.025),
+                     *b = field_of_ball(1.0, 0.6, 0.6, 0.3, 0.025);
+    const truth_solid both[2] = {ball(-1.0, 0.6, -0.6, 0.3), ball(1.0, 0.6, 0.6, 0.3)};
+    OWNED(vsh_field) *all = field_of((truth_scene){both, 2}, 0.025, 4.0);
+    const vsh_light light = sun(towards, 0.2);
+    const vshi_layer layer = layer_of(b);
+    float united[COUNT], layered[COUNT];
+    shade_plainly(occluders_of(all), &light, united);
+    shade_plainly(occluders_with(a, &layer, 1), &light, layered);
+    size_t dark = 0;
+    double square = 0.0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        dark += united[i] < 0.1f;
+        square += (double)((layered[i] - united[i]) * (layered[i] - united[i]));
+    }
+    assert_true(dark > 40);
+    assert_true(sqrt(square / COUNT) < 2e-3);
+}
+
+/* The darker of both is the field alone, bit by bit, the product its square. */
+TEST(layers_are_combined_by_product_or_minimum) {
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05);
+    const vsh_light light = sun(towards, 0.2);
+    vshi_layer layer = layer_of(field);
+    float alone[COUNT], darker[COUNT], product[COUNT], remapped[COUNT];
+    shade_plainly(occluders_of(field), &light, alone);
+    layer.combine = VSH_COMBINE_MULTIPLY;
+    shade_plainly(occluders_with(field, &layer, 1), &light, product);
+    layer.combine = VSH_COMBINE_MIN;
+    shade_plainly(occluders_with(field, &layer, 1), &light, darker);
+    layer.remap[0] = 0.25;
+    layer.remap[1] = 0.75;
+    shade_plainly(occluders_with(field, &layer, 1), &light, remapped);
+    assert_memory_equal(alone, darker, sizeof alone);
+    size_t between_edges = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        const double x = fmin(1.0, fmax(0.0, ((double)alone[i] - 0.25) / 0.5));
+        assert_float_equal(product[i], alone[i] * alone[i], 1e-6);
+        assert_float_equal(remapped[i], fmin((double)alone[i], x * x * (3.0 - 2.0 * x)), 1e-6);
+        between_edges += x > 0.0 && x < 1.0;
+    }
+    assert_true(between_edges > 20);
+}
+
+TEST(half_the_softness_is_half_the_light) {
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.8, 0.0, 0.5, 0.05), *empty = field_of_nothing(0.05);
+    const vsh_light full = sun(towards, 2.0 * atan(0.1)), half = sun(towards, 2.0 * atan(0.05));
+    vshi_layer layer = layer_of(field);
+    layer.softness = 0.5;
+    float smaller[COUNT], layered[COUNT];
+    shade_plainly(occluders_of(field), &half, smaller);
+    shade_plainly(occluders_with(empty, &layer, 1), &full, layered);
+    assert_same(layered, smaller, 1e-6);
+    layer.softness = 0.0;
+    shade_plainly(occluders_with(empty, &layer, 1), &full, layered);
+    size_t dark = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        assert_true(layered[i] == 0.0f || layered[i] == 1.0f);
+        dark += layered[i] == 0.0f;
+    }
+    assert_true(dark > 50);
+}
+
+TEST(layers_cast_for_the_lights_they_name_and_in_ao_by_option) {
+    OWNED(vsh_field) *field = field_of_ball(0.0, 0.4, 0.0, 0.4, 0.05), *empty = field_of_nothing(0.05);
+    vsh_light light = sun(towards, 0.2);
+    const char *const names[] = {"moon", "sun"};
+    vshi_layer layer = layer_of(field);
+    layer.lights = names;
+    layer.light_count = 1;
+    float values[COUNT], ao[COUNT], alone[COUNT];
+    shade_plainly(occluders_with(empty, &layer, 1), &light, values);
+    assert_all(values, 1.0, 0.0);
+    layer.light_count = 2;
+    shade_plainly(occluders_with(empty, &layer, 1), &light, values);
+    assert_true(least_of(values) < 0.01f);
+
+    shade_ao(occluders_of(field), alone);
+    for (int remapped = 0; remapped < 2; ++remapped) {
+        layer.remap[0] = remapped ? 0.4 : 0.0; /* which is of shadows */
+        layer.remap[1] = remapped ? 0.6 : 1.0;
+        shade_ao(occluders_with(empty, &layer, 1), ao);
+        assert_same(ao, alone, 1e-6);
+    }
+    layer.ao = 0;
+    shade_ao(occluders_with(empty, &layer, 1), ao);
+    assert_all(ao, 1.0, 1e-6);
+}
+
+TEST(deviations_of_independent_values_add_up) {
+    OWNED(vsh_field) *a = field_of_ball(-0.2, 0.8, 0.0, 0.5, 0.05),
+                     *b = field_of_ball(0.2, 0.9, 0.1, 0.5, 0.05);
+    const vsh_light light = sun(towards, 0.3);
+    vshi_layer layer = layer_of(b);
+    float va[COUNT], vb[COUNT], both[COUNT], da[COUNT], db[COUNT], dboth[COUNT];
+    shade(occluders_of(a), &light, VSH_SHADOW_RAYS, va, da);
+    shade(occluders_of(b), &light, VSH_SHADOW_RAYS, vb, db);
+    shade(occluders_with(a, &layer, 1), &light, VSH_SHADOW_RAYS, both, dboth);
+    size_t open = 0;
+    for (size_t i = 0; i < COUNT; ++i) {
+        if (va[i] > 0.0f && va[i] < 1.0f && vb[i] > 0.0f && vb[i] < 1.0f) {
+            /* the layer's rays are others than those of the field's own bake: their errors are not */
+            assert_float_equal(dboth[i], hypot((double)(da[i] * vb[i]), (double)(va[i] * db[i])), 0.02);
+            assert_true(dboth[i] > 0.0f);
+            ++open;
+        }
+    }
+    assert_true(open > 10);
+}
+
+/* A lightmap of the floor y = 0 over [-1, 1]², u along x, v along -z. */
+typedef struct floor_bake {
+    float shadow[COUNT], ao[COUNT];
+    vsh_bake_stats stats;
+} floor_bake;
+
+static void bake_floor(const vsh_field *field, const vshi_layer *layers, size_t layer_count,
+                       floor_bake *baked) {
+    static const float corners[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1},
+                       uvs[8] = {0, 0, 1, 0, 1, 1, 0, 1};
+    const vsh_mesh mesh = quad_mesh("floor", corners, uvs);
+    vsh_lightmap_options options = preview_lightmap_options();
+    options.width = options.height = SIZE;
+    options.padding = 0;
+    options.ao_spacing = 1;
+    OWNED(vsh_charts) *texels = NULL;
+    assert_ok(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, &failure));
+    const double over[3] = {-1.0, 0.7, 0.1};
+    const vsh_light light = sun(over, 0.2);
+    const vsh_shade_options shade = preview_options();
+    float *planes[1] = {baked->shadow};
+    const vsh_lightmap lightmap = {.shadow = planes, .ao = baked->ao};
+    baked->stats = vsh_bake_stats_zero();
+    assert_ok(vsh_bake_lightmap(occluders_with(field, layers, layer_count), texels, &light, 1, &shade, NULL,
+                                &lightmap, &baked->stats, &failure));
+}
+
+/* A wall of [-0.2, 0.2] × [0, 1] across the floor's slab: in one field, in a layer of its own, and all in a
+ * layer. The layer's voxels are then four times as large as the unit of start offsets. The receiver must not
+ * shade itself. Texels under the wall are invalid and filled in each way. */
+TEST(lightmaps_are_the_same_however_casters_are_layered) {
+    const truth_solid slab = {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {1.5, 0.25, 1.5}};
+    const truth_solid wall = {.shape = TRUTH_BOX, .center = {0.0, 0.4, 0.0}, .half = {0.2, 0.6, 1.5}};
+    const truth_solid both[2] = {slab, wall};
+    OWNED(vsh_field) *united = field_of((truth_scene){both, 2}, 0.04, 4.0);
+    OWNED(vsh_field) *ground = field_of((truth_scene){&slab, 1}, 0.04, 4.0);
+    OWNED(vsh_field) *alone = field_of((truth_scene){&wall, 1}, 0.04, 4.0), *empty = field_of_nothing(0.01);
+    const vshi_layer of_wall = layer_of(alone), of_all = layer_of(united);
+    static floor_bake plain, layered;
+    bake_floor(united, NULL, 0, &plain);
+    assert_in_range(plain.stats.invalid_texels, SIZE * SIZE / 6, SIZE * SIZE / 4);
+    for (int w = 0; w < 2; ++w) {
+        bake_floor(w == 0 ? ground : empty, w == 0 ? &of_wall : &of_all, 1, &layered);
+        assert_int_equal(layered.stats.invalid_texels, plain.stats.invalid_texels);
+        assert_same(layered.shadow, plain.shadow, 0.05);
+        assert_same(layered.ao, plain.ao, 0.05);
+    }
+}
+
+TEST(layers_out_of_range_are_refused) {
+    OWNED(vsh_field) *empty = field_of_nothing(0.05);
+    const vsh_light light = sun(towards, 0.2);
+    const vsh_points points = {1, positions, normals, NULL};
+    float value;
+    const struct {
+        const char *message;
+        vshi_layer layer;
+    } cases[] = {
+        {"layer 0: none of field, heights and spheres: expected one", vshi_layer_default()},
+        {"layer 0: softness -1 is out of range 0 … 1000", {.softness = -1.0}},
+        {"layer 0: softness nan is out of range 0 … 1000", {.softness = NAN}},
+        {"layer 0: method 10 is out of range -1 … 9", {.method = 10}},
+        {"layer 0: combine 2 is out of range 0 … 1", {.combine = 2}},
+        {"layer 0: remap[1] 0.25 is out of range 0.5 … 1", {.remap = {0.5, 0.25}}},
+        {"layer 0: remap from 0.5 to 0.5: expected a rise", {.remap = {0.5, 0.5}}},
+        {"layer 0: start_offset 17 is out of range -1 … 16", {.start_offset = 17.0}},
+        {"layer 0: method exact: the occluders have no triangles, which it traces",
+         {.field = empty, .method = VSH_SHADOW_EXACT}},
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        vshi_layer layer = cases[i].layer;
+        vshi_occluder_parts parts = {.field = NULL};
+        parts.field = empty;
+        parts.layers = &layer;
+        parts.layer_count = 1;
+        OWNED(vsh_occluders) *made = NULL;
+        vsh_result result = vshi_occluders_from_parts(&parts, &made, &failure);
+        if (result == VSH_OK) { /* only the call knows the method */
+            result = vsh_shade_shadow(made, &points, &light, NULL, NULL, &value, NULL, NULL, &failure);
+        }
+        assert_int_equal(result, VSH_ERROR_ARGUMENT);
+        assert_string_equal(failure.message, cases[i].message);
+    }
+}
+
+static int fill(void **state) {
+    floor_texels(SIZE, positions, normals);
+    return 0;
+}
+
+FIXTURE(fill, NULL)

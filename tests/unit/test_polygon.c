@@ -160,7 +160,7 @@ TEST(long_and_narrow_polygons_are_covered) {
 }
 
 /* From whichever corner each begins. */
-TEST(known_polygons_are_cut_into_as_many_triangles_as_they_should) {
+TEST(known_polygons_are_cut_into_the_expected_number_of_triangles) {
     enum { NONE = -1 };
     static const struct {
         const char *name;
@@ -205,7 +205,7 @@ TEST(known_polygons_are_cut_into_as_many_triangles_as_they_should) {
         {"a star", {{0, 10}, {6, -8}, {-9, 3}, {9, 3}, {-6, -8}}, 5, NONE, 0.0},
     };
     static shape s;
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const size_t count = cases[i].count;
         for (size_t first = 0; first < count; ++first) {
             float at[16][2];

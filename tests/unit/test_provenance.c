@@ -1,10 +1,10 @@
-/* What outputs tell of where they come from, and the files that carry it. */
+/* Outputs tell from which settings and inputs they were made. Files carry this. */
 #include "casts.h"
 #include "images.h"
 #include "previews.h"
 #include "testing.h"
 
-TEST(digests_are_those_of_the_standard) {
+TEST(digests_match_the_standards_examples) {
     /* FIPS 180-4's examples, and a million times 'a' (NIST, "SHA examples") */
     static const struct {
         const char *text;
@@ -25,7 +25,7 @@ TEST(digests_are_those_of_the_standard) {
         {"a", 65537, "008ffc88d3c96a9f307524eb361e47c5222a887fc45fa0c1fb8d429c5c23b430"},
         {"a", 1000000, "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         FILE *file = fopen(at("digest.bin"), "wb");
         assert_non_null(file);
         for (size_t k = 0; k < cases[i].times; ++k) {
@@ -38,7 +38,7 @@ TEST(digests_are_those_of_the_standard) {
     }
 }
 
-TEST(digests_of_what_is_no_file_are_refused) {
+TEST(digests_of_folders_and_pipes_are_refused) {
     char digest[VSH_DIGEST_TEXT];
     assert_fails(vsh_file_digest(at("nothing"), NULL, digest, &failure), VSH_ERROR_READ,
                  "nothing: cannot be read: No such file");
@@ -61,7 +61,7 @@ static void write_text(const char *name, const char *text) {
 }
 
 /* A glTF with a buffer beside it, one within, and one behind an escaped name. */
-TEST(settings_and_inputs_are_told_in_order_and_once) {
+TEST(settings_and_inputs_are_listed_in_order_and_once) {
     write_text("scene.json", "{}");
     write_text("one.bin", "1");
     write_text("two parts.bin", "2");
@@ -114,7 +114,7 @@ TEST(settings_and_inputs_are_told_in_order_and_once) {
         {"vdbshade_input_3",
          "sha256:d4735e3a265e16eee03f59718b9b5d03019c07d8b6c51f90da3a666eec13ab35 two parts.bin"},
     };
-    assert_int_equal(count, sizeof expected / sizeof expected[0]);
+    assert_int_equal(count, COUNT_OF(expected));
     for (size_t i = 0; i < count; ++i) {
         assert_string_equal(list[i].name, expected[i][0]);
         if (expected[i][1] != NULL) {
@@ -157,17 +157,17 @@ TEST(files_that_a_large_glb_names_are_found_from_its_json_alone) {
     assert_int_equal(unlink(at("large.glb")), 0);
 }
 
-TEST(the_error_that_a_channel_was_made_to_is_told) {
+TEST(the_error_of_a_channel_is_read_from_its_attributes) {
     const vsh_attribute list[] = {{"vdbshade_version", "0.2.0"},
                                   {"vdbshade_shadow", "adaptive, max error 0.005, sobol, frame 3"},
                                   {"vdbshade_ao", "exact within 2.5, max error 0.02, sobol"},
                                   {"vdbshade_sky", "exact over y, max error 0.01, sobol"}};
-    assert_true(vsh_provenance_max_error(list, 3, "shadow.sun") == 0.005);
-    assert_true(vsh_provenance_max_error(list, 3, "ao") == 0.02);
-    assert_true(vsh_provenance_max_error(list, 4, "sky") == 0.01);
-    assert_true(isnan(vsh_provenance_max_error(list, 3, "irradiance.R")));
-    assert_true(isnan(vsh_provenance_max_error(list, 2, "ao")));
-    assert_true(isnan(vsh_provenance_max_error(NULL, 0, "ao")));
+    assert_true(vshi_provenance_max_error(list, 3, "shadow.sun") == 0.005);
+    assert_true(vshi_provenance_max_error(list, 3, "ao") == 0.02);
+    assert_true(vshi_provenance_max_error(list, 4, "sky") == 0.01);
+    assert_true(isnan(vshi_provenance_max_error(list, 3, "irradiance.R")));
+    assert_true(isnan(vshi_provenance_max_error(list, 2, "ao")));
+    assert_true(isnan(vshi_provenance_max_error(NULL, 0, "ao")));
     static const char *const none[] = {
         "cone",
         "exact, max error 0.02, 64 rays, sobol", /* a limit: more may be left */
@@ -176,9 +176,9 @@ TEST(the_error_that_a_channel_was_made_to_is_told) {
         "exact, max error -1",
         "exact, max error nan",
         ""};
-    for (size_t i = 0; i < sizeof none / sizeof none[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(none); ++i) {
         const vsh_attribute one = {"vdbshade_shadow", none[i]};
-        assert_true(isnan(vsh_provenance_max_error(&one, 1, "shadow.key")));
+        assert_true(isnan(vshi_provenance_max_error(&one, 1, "shadow.key")));
     }
 }
 
@@ -209,18 +209,14 @@ TEST(images_carry_them_and_give_them_back) {
 
 TEST(level_sets_and_volumes_carry_them) {
     const vsh_sdf_node ball = vsh_sdf_node_default();
-    const vsh_sdf sdf = {&ball, 1};
-    vsh_grid_options options = vsh_grid_options_default();
-    options.resolution = 16;
-    OWNED(vsh_grid) *grid = NULL;
+    OWNED(vsh_grid) *grid = grid_of_tree(&ball, 1, with_voxel(0.125));
     OWNED(vsh_field) *field = NULL;
     OWNED(vsh_voxels) *voxels = NULL;
     OWNED(vsh_volume) *volume = NULL;
     const vsh_light sun = vsh_light_default();
     const vsh_attribute told = {"vdbshade_command", "voxelize ball"};
-    assert_ok(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure));
     assert_ok(vsh_grid_write(grid, at("told.vdb"), NULL, &told, 1, &failure));
-    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
+    assert_ok(vshi_field_create(grid, NULL, NULL, &field, &failure));
     assert_ok(vsh_voxels_from_grid(grid, 0.0, NULL, &voxels, &failure));
     assert_ok(vsh_bake_volume(occluders_of(field), voxels, &sun, 1, NULL, NULL, &volume, NULL, &failure));
     assert_ok(vsh_volume_write(volume, at("volume.vdb"), 0, &told, 1, &failure));
@@ -253,7 +249,7 @@ TEST(attributes_that_no_file_could_hold_are_refused) {
     };
     sample s;
     make(&s, 2, 2, 3, LIGHTMAP);
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         vsh_image_options options = vsh_image_options_default();
         options.attributes = cases[i].list;
         options.attribute_count = cases[i].count;

@@ -6,11 +6,18 @@
 #include <openvdb/tools/LevelSetSphere.h>
 #include <sys/resource.h>
 
+#include <malloc.h>
+
+extern "C" {
+#include "lit/work.h"
+}
+
+// Last: it has macros named as OpenVDB's members are.
 #include "testing.h"
 
 namespace {
 
-const std::string ASSETS = VSH_ASSETS;
+const std::string ASSETS = VSH_ASSETS, FONT = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
 
 std::string ball_file() {
     return save("ball.vdb", {sphere()});
@@ -70,11 +77,8 @@ TEST(grids_are_the_same_for_every_kind_of_transform) {
         const size_t half = warned.size() / 2; // each said the same
         assert_true(warned.size() % 2 == 0 &&
                     std::equal(warned.begin(), warned.begin() + long(half), warned.begin() + long(half)));
-        vsh_grid_info info[2];
-        vsh_grid_get_info(read.here, &info[0]);
-        vsh_grid_get_info(read.there, &info[1]);
-        assert_same_info(info[0], info[1]);
-        const openvdb::Vec3d at(0.3, -0.4, 0.5); // what is not in the info: the map's inverse
+        assert_same_info(read.here->info, read.there->info);
+        const openvdb::Vec3d at(0.3, -0.4, 0.5); // the inverse of the map is not in the info
         assert_true(read.here->level_set->transform().worldToIndex(at) ==
                     read.there->level_set->transform().worldToIndex(at));
     }
@@ -186,9 +190,8 @@ TEST(lists_voxels_and_texts_are_the_same) {
     assert_same_info(info[0].bounds_min, info[1].bounds_min);
     assert_same_info(info[0].voxel_size, info[1].voxel_size);
 
-    const char *font = "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf";
     const Both<vsh_outline> outline(vsh_outline_free, [&](const vsh_run *run, vsh_outline **made) {
-        return vsh_outline_from_text("Ag&8\nx", font, nullptr, run, made, &failure);
+        return vshi_outline_from_text("Ag&8\nx", FONT.c_str(), nullptr, run, made, &failure);
     });
     const size_t contours = outline.here->contour_count;
     assert_int_equal(contours, outline.there->contour_count);
@@ -246,7 +249,7 @@ TEST(a_reader_that_fails_is_an_error_with_its_reason) {
         {"hungry", 120.0, VSH_ERROR_LIMIT, "more than the memory limit of 100 MB"},
         {"silent", 120.0, VSH_ERROR_ARGUMENT, "'/proc/self/exe' is no reader of vdbshade"},
         {"ends", 120.0, VSH_ERROR_ARGUMENT, "is no reader"},
-        {"long", 120.0, VSH_ERROR_READ, "ball.vdb: damaged: what its reader sent does not hold"},
+        {"long", 120.0, VSH_ERROR_READ, "ball.vdb: damaged: its reader sent a bad answer"},
         {"code", 120.0, VSH_ERROR_READ, "an unknown result"},
     };
     const std::string path = ball_file();
@@ -351,7 +354,7 @@ TEST(a_host_may_ignore_its_children_and_have_threads) {
 TEST(an_older_program_reads_in_its_own_process) {
     misbehave("crash");
     vsh_run run = with_reader();
-    run.struct_size = offsetof(vsh_run, reader); // what it does not know is not looked at
+    run.struct_size = offsetof(vsh_run, reader); // members that an older caller does not know are not read
     run.reader_seconds = -1.0;
     vsh_grid *grid = nullptr;
     assert_int_equal(vsh_grid_read(ball_file().c_str(), nullptr, &run, &grid, &failure), VSH_OK);
@@ -359,7 +362,7 @@ TEST(an_older_program_reads_in_its_own_process) {
     misbehave(nullptr);
 }
 
-TEST(the_memory_limit_holds_whatever_the_file_says_of_itself) {
+TEST(sizes_in_a_file_do_not_pass_the_memory_limit) {
     const std::string path = save("large.vdb", {ball<FloatGrid>(5.0, 3.0f)});
     std::string bytes = content(path);
     const size_t at = bytes.find("file_mem_bytes");
@@ -379,13 +382,13 @@ TEST(the_memory_limit_holds_whatever_the_file_says_of_itself) {
 }
 
 // Leaves far from each other take nodes of 300 kB each, of which hardly anything stands in the file.
-TEST(what_a_reader_takes_is_held_to_the_memory_limit) {
-    if (VSHI_SANITIZED) { // whose readers have no limit
+TEST(readers_keep_the_memory_limit) {
+    if (VSHI_SANITIZED) { // sanitized readers have no limit
         skip();
     }
     const uint64_t limit = uint64_t(20) << 20;
-    // pages that it touched (what is resident is told as no less than that of its parent): the limit, 64 MiB
-    // beside it, and what its libraries have
+    // Page faults of the reader, because its resident size includes its parent's. Allowed are the limit,
+    // 64 MiB more, and 64 MiB for its libraries.
     const long MOST_FAULTS = long((limit + (uint64_t(64 + 64) << 20)) / 4096);
     const FloatGrid::Ptr far = FloatGrid::create(0.3f);
     far->setGridClass(openvdb::GRID_LEVEL_SET);
@@ -397,11 +400,11 @@ TEST(what_a_reader_takes_is_held_to_the_memory_limit) {
     file.setGridStatsMetadataEnabled(false); // else the file says itself what it takes
     file.write({far});
     file.close();
-    const pid_t host = fork(); // whose only child the reader is
+    const pid_t host = fork(); // the reader is its only child
     assert_true(host >= 0);
     if (host == 0) {
         vsh_run run = with_reader();
-        run.memory_limit = uint64_t(1) << 30; // and most of it is held by the caller
+        run.memory_limit = uint64_t(1) << 30; // the caller holds most of it
         run.memory_held = run.memory_limit - limit;
         std::vector<vsh_vdb_entry> entries(4);
         size_t count = 0;
@@ -414,6 +417,180 @@ TEST(what_a_reader_takes_is_held_to_the_memory_limit) {
     int status = -1;
     assert_int_equal(waitpid(host, &status, 0), host);
     assert_int_equal(status, 0);
+}
+
+// --- checks of a reader's answer
+
+constexpr int DAMAGES = 4000;
+
+// Runs body(), which throws a Failure for what it refuses.
+template <typename Body> bool refuses(Body &&body) {
+    const vsh_result result = vshi::guard(&failure, VSH_ERROR_INTERNAL, "answer", [&] {
+        body();
+        return VSH_OK;
+    });
+    assert_int_not_equal(result, VSH_ERROR_INTERNAL);
+    return result != VSH_OK;
+}
+
+void no_name(vshi_encoder *encoder) {
+    vshi_encode_text(encoder, nullptr);
+}
+
+void no_request(vshi_encoder *) {}
+
+TEST(damaged_level_sets_are_refused_or_are_trees) {
+    const auto whole = payload_of(vshi_serve_grid, ball_file(), no_name);
+    const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+        return refuses([&] {
+            const vshi::LevelSet set = vshi::decode_level_set(decoder, "a.vdb");
+            const vsh_run run = vsh_run_default();
+            vshi::Stage stage(run, "load");
+            if (vshi::examine_kind(*set.grid).kind != vshi::Finding::BAD) {
+                vshi::examine_values(*set.grid, stage);
+            }
+        });
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+TEST(damaged_voxels_are_refused_or_sorted) {
+    const auto whole = payload_of(vshi_serve_voxels, ball_file(), no_name);
+    const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+        return refuses([&] {
+            std::string grid;
+            openvdb::math::Transform::Ptr transform;
+            const auto blocks = vshi::decode_blocks(decoder, "a.vdb", grid, transform);
+            assert_true(std::is_sorted(blocks.begin(), blocks.end(), [](const auto &a, const auto &b) {
+                return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
+            }));
+        });
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+TEST(damaged_models_are_refused_or_sound) {
+    const auto whole = payload_of(vshi_serve_model, ASSETS + "/thin.glb", no_request);
+    const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+        OWNED(vsh_model) *model = nullptr;
+        if (vshi_model_decode(decoder, "a.glb", nullptr, &model, &failure) != VSH_OK) {
+            return true;
+        }
+        for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+            const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+            vsh_mesh_report report;
+            const vsh_result result = vsh_mesh_check(&mesh, &report, &failure);
+            assert_true(result == VSH_OK || result == VSH_ERROR_INPUT); // beyond numbers once moved
+        }
+        return false;
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+TEST(damaged_decompressed_vertices_are_refused_or_sound) {
+    constexpr size_t PRIMITIVES = 3;
+    const auto whole = payload_of(vshi_serve_draco, std::string(VSH_MODELS) + "/scene_draco.glb", no_request);
+    const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+        FREED_BY(vshi_lit_dracos_free) vshi_lit_dracos dracos = {};
+        dracos.list = static_cast<vshi_lit_draco *>(std::calloc(PRIMITIVES, sizeof *dracos.list));
+        dracos.count = PRIMITIVES;
+        const bool bad = vshi_lit_dracos_decode(decoder, "a.glb", &dracos, &failure) != VSH_OK;
+        for (size_t i = 0; i < PRIMITIVES; ++i) { // each index is one of a vertex, each value is there
+            const vshi_lit_draco &draco = dracos.list[i];
+            unsigned sum = 0;
+            for (size_t k = 0; draco.attribute_count > 0 && k < 3 * draco.triangle_count; ++k) {
+                assert_true(draco.indices[k] < draco.vertex_count);
+            }
+            for (size_t k = 0; k < draco.attribute_count && draco.vertex_count > 0; ++k) {
+                const vshi_lit_draco_attribute &attribute = draco.attributes[k];
+                const size_t size = draco.vertex_count * size_t(attribute.components) *
+                                    vshi_gltf_component_size(attribute.type);
+                sum += attribute.values != nullptr ? attribute.values[size - 1] : 0;
+            }
+            assert_true(sum < 1000000);
+        }
+        return bad;
+    });
+    assert_in_range(refused, DAMAGES / 64, DAMAGES - 1);
+}
+
+TEST(damaged_images_and_contours_are_refused_or_sound) {
+    auto whole = payload_of(vshi_serve_image, ASSETS + "/emblem.png",
+                            [](vshi_encoder *request) { vshi_encode_count(request, 0); }); // bytes of its own
+    int refused = damage(whole, DAMAGES / 8, [&](vshi_decoder *decoder) {
+        OWNED(vsh_image_file) *file = nullptr;
+        const bool bad = vshi_image_decode(decoder, "a.png", &file, &failure) != VSH_OK;
+        const vsh_image image = vsh_image_view(file);
+        for (int32_t c = 0; c < image.channel_count; ++c) {
+            assert_in_range(std::strlen(image.names[c]), 0, 255);
+        }
+        return bad;
+    });
+    assert_in_range(refused, DAMAGES / 64, DAMAGES / 8 - 1);
+    whole = payload_of(vshi_serve_text, FONT, [](vshi_encoder *encoder) {
+        vshi_encode_text(encoder, "A8");
+        vshi_encode_number(encoder, 1.0);
+        vshi_encode_number(encoder, 1.0);
+        vshi_encode_count(encoder, 0);
+    });
+    refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+        const vsh_run run = vsh_run_default();
+        vshi_contours contours = {};
+        contours.run = &run;
+        contours.error = &failure;
+        OWNED(vsh_outline) *outline = nullptr;
+        if (vshi_contours_decode(decoder, &contours, "a.ttf", &failure) != VSH_OK) {
+            vshi_contours_free(&contours);
+            return true;
+        }
+        return vshi_contours_finish(&contours, false, "text", &outline) != VSH_OK;
+    });
+    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+}
+
+TEST(a_message_is_not_read_past_its_end) {
+    alignas(8) const uint64_t words[] = {16, 0x4242424242424242, 0x0042424242424242, UINT64_MAX, 5, 0};
+    const auto decoder_of = [&](size_t from, size_t to) {
+        const auto *bytes = reinterpret_cast<const unsigned char *>(words);
+        return vshi_decoder{bytes + 8 * from, bytes + 8 * to, false};
+    };
+    vshi_decoder decoder = decoder_of(0, 3);
+    assert_string_equal(vshi_decode_text(&decoder, true), "BBBBBBBBBBBBBBB");
+    assert_true(vshi_decoder_ends(&decoder));
+    for (const size_t from : {0, 1}) { // the text ends behind the message; a size out of the world
+        decoder = decoder_of(from, from + 2);
+        assert_null(vshi_decode_text(&decoder, true));
+        assert_true(decoder.bad);
+    }
+    decoder = decoder_of(3, 5);
+    assert_null(vshi_decode_text(&decoder, true)); // a NULL that was sent
+    assert_false(decoder.bad);
+    assert_null(vshi_decode_array(&decoder, uint64_t(1) << 62, 8)); // a product out of range
+    assert_true(decoder.bad);
+    decoder = decoder_of(4, 6);
+    assert_int_equal(vshi_decode_count(&decoder, 4), 0);
+    assert_true(decoder.bad);
+}
+
+// An answer is memory, too: it ends where the heap leaves it no room, whatever each may come to alone.
+TEST(an_answer_and_the_heap_share_their_room) {
+    if (VSHI_SANITIZED) {
+        skip(); // its heap is not libc's, which tells what it holds
+    }
+    static vshi_encoder encoder;
+    const size_t bytes = size_t(8) << 20;
+    const std::vector<char> answer(bytes);
+    for (const bool heap : {false, true}) {
+        const struct mallinfo2 now = mallinfo2();
+        const std::vector<char> held(heap ? bytes : 0);
+        const int file = memfd_create("answer", 0);
+        vshi_encoder_begin(&encoder, file, 0);
+        encoder.room = now.uordblks + now.hblkhd + bytes + bytes / 2;
+        vshi_encode_array(&encoder, answer.data(), bytes, 1);
+        assert_true(vshi_encoder_flush(&encoder) == !heap);
+        assert_int_equal(encoder.error, heap ? ENOMEM : 0);
+        close(file);
+    }
 }
 
 } // namespace

@@ -1,4 +1,4 @@
-/* Voxels that nobody named: how many are made of what, and what casts without any. */
+/* Resolutions where the user gives none, and casters without voxels. */
 #include "fields.h"
 #include "scenes.h"
 #include "testing.h"
@@ -32,6 +32,18 @@ static void scatter(double positions[POINTS][3], float normals[POINTS][3]) {
     }
 }
 
+/* Root mean square of the differences; more than 20 points must be partly lit. */
+static double error_of(const float lit[POINTS], const float truth[POINTS]) {
+    double square = 0.0;
+    int partly = 0;
+    for (int i = 0; i < POINTS; ++i) {
+        square += pow((double)lit[i] - (double)truth[i], 2.0);
+        partly += truth[i] > 0.05f && truth[i] < 0.95f;
+    }
+    assert_true(partly > 20);
+    return sqrt(square / POINTS);
+}
+
 /* --- casters without voxels */
 
 TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
@@ -43,8 +55,7 @@ TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
     float normals[POINTS][3], lit[POINTS], truth[POINTS];
     scatter(positions, normals);
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(made, &parts);
+    const vshi_occluder_parts parts = parts_of(made);
     for (int lamp = 0; lamp < 2; ++lamp) {
         vsh_light light = vsh_light_default();
         light.angle = 0.3;
@@ -57,16 +68,9 @@ TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
         vsh_shade_stats stats = vsh_shade_stats_zero();
         assert_ok(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &failure));
         assert_true(stats.samples == 0 && stats.marches == 0 && stats.rays > 0);
-        assert_ok(vsh_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light,
-                                   4096, NULL, truth, &failure));
-        double square = 0.0;
-        int between_both = 0;
-        for (int i = 0; i < POINTS; ++i) {
-            square += pow((double)lit[i] - (double)truth[i], 2.0);
-            between_both += truth[i] > 0.05f && truth[i] < 0.95f;
-        }
-        assert_true(between_both > 20);
-        assert_true(sqrt(square / POINTS) < options.max_error);
+        assert_ok(vshi_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light,
+                                    4096, NULL, truth, &failure));
+        assert_true(error_of(lit, truth) < options.max_error);
     }
 }
 
@@ -82,7 +86,7 @@ TEST(ao_by_rays_has_the_bits_that_it_has_with_voxels) {
     assert_memory_equal(ao[0], ao[1], sizeof ao[0]);
 }
 
-TEST(what_needs_voxels_is_refused_without_them) {
+TEST(methods_that_need_voxels_are_refused_without_them) {
     OWNED(vsh_occluders) *made = plate_of(0);
     const double at[3] = {0.0, 0.0, 0.0};
     const float up[3] = {0.0f, 1.0f, 0.0f};
@@ -104,8 +108,7 @@ TEST(what_needs_voxels_is_refused_without_them) {
         assert_int_equal(vsh_shade_ao(made, &points, &options, NULL, &value, NULL, NULL, NULL, &failure),
                          method >= VSH_AO_EXACT ? VSH_OK : VSH_ERROR_ARGUMENT);
     }
-    vsh_occluder_parts parts;
-    vsh_occluders_get_parts(made, &parts);
+    const vshi_occluder_parts parts = parts_of(made);
     vsh_field_sample(parts.field, 1, at, &value);
     assert_true(isnan(value));
     OWNED(vsh_query) *query = NULL;
@@ -114,22 +117,6 @@ TEST(what_needs_voxels_is_refused_without_them) {
     output.distance = &value;
     assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &failure),
                      VSH_ERROR_ARGUMENT);
-}
-
-TEST(parts_of_triangles_alone_cast) {
-    const vsh_mesh mesh = plate();
-    OWNED(vsh_triangles) *triangles = NULL;
-    assert_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
-    vsh_occluder_parts parts = vsh_occluder_parts_default();
-    parts.triangles = triangles;
-    OWNED(vsh_occluders) *made = NULL;
-    assert_ok(vsh_occluders_from_parts(&parts, &made, &failure));
-    const double at[2][3] = {{0.0, 0.0, 0.0}, {3.0, 0.0, 0.0}};
-    const vsh_points points = {2, at[0], NULL, NULL};
-    const vsh_light light = vsh_light_default();
-    float lit[2];
-    assert_ok(vsh_shade_shadow(made, &points, &light, NULL, NULL, lit, NULL, NULL, &failure));
-    assert_true(lit[0] == 0.0f && lit[1] == 1.0f);
 }
 
 /* Shadows of a scene of the thin asset, in a layer of its own or in none, and the truth; returns what fields
@@ -154,15 +141,15 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     scatter(positions, normals);
     const vsh_points points = {POINTS, positions[0], normals[0], NULL};
     assert_ok(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &failure));
-    OWNED(vsh_triangles) *triangles = NULL;
-    vsh_solids *solids = NULL;
-    assert_ok(vsh_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
-    assert_ok(vsh_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
-                               1024, NULL, truth, &failure));
+    OWNED(vshi_triangles) *triangles = NULL;
+    vshi_solids *solids = NULL;
+    assert_ok(vshi_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
+    assert_ok(vshi_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
+                                1024, NULL, truth, &failure));
     return info.field_bytes;
 }
 
-TEST(scenes_and_layers_without_voxels_cast_as_the_truth_says) {
+TEST(scenes_and_layers_without_voxels_match_the_truth) {
     for (int layered = 0; layered < 2; ++layered) {
         float lit[POINTS], truth[POINTS];
         assert_true(shade_scene(layered != 0, lit, truth) == 0);
@@ -185,7 +172,7 @@ static int32_t chosen(const char *more, const char *casters, double points) {
     OWNED(vsh_scene) *scene = parse("/scene.json", text);
     OWNED(vsh_assets) *assets = NULL;
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
-    const int32_t resolution = vsh_scene_resolution(scene, assets, NULL, points);
+    const int32_t resolution = vshi_scene_resolution(scene, assets, NULL, points);
     return resolution;
 }
 
@@ -222,10 +209,10 @@ TEST(marched_shapes_get_as_many_as_their_error_asks_for) {
     assert_int_equal(chosen(SUN ", \"method\": \"cone\"", BALL, 1e6), 256);
 }
 
-TEST(what_is_named_stays_as_it_is) {
-    assert_int_equal(chosen(SUN ", \"resolution\": 64", MESH, 1.0), VSH_RESOLUTION_NAMED);
-    assert_int_equal(chosen(SUN ", \"resolution\": 256", MESH, 1.0), VSH_RESOLUTION_NAMED);
-    assert_int_equal(chosen(SUN ", \"voxel_size\": 0.5", BALL, 1.0), VSH_RESOLUTION_NAMED);
+TEST(resolutions_that_are_given_stay) {
+    assert_int_equal(chosen(SUN ", \"resolution\": 64", MESH, 1.0), VSHI_RESOLUTION_NAMED);
+    assert_int_equal(chosen(SUN ", \"resolution\": 256", MESH, 1.0), VSHI_RESOLUTION_NAMED);
+    assert_int_equal(chosen(SUN ", \"voxel_size\": 0.5", BALL, 1.0), VSHI_RESOLUTION_NAMED);
     assert_int_equal(chosen(SUN ", \"method\": \"cone\"", MESH, 1.0), 256);
     assert_int_equal(chosen(SUN ", \"method\": \"adaptive\"", MESH, 1.0), 256);
 }

@@ -2,7 +2,7 @@
  * promised. */
 #include "testing.h"
 
-#include "shade/rays.h"
+#include "shade/shade.h"
 #include "trace/sampler.h"
 #include "truth/directions.h"
 
@@ -128,7 +128,7 @@ static size_t cell_of(double at, size_t cells) {
 }
 
 /* Whether 2^m points on the disc are a (0, m, 2)-net in base 2: one in each of the 2^m boxes of any shape.
- * Those that may be on either side of a box's edge by rounding may be missing. */
+ * Boxes may be empty whose point rounding can put on the other side of an edge. */
 static bool is_net(const double (*disc)[2], int32_t m) {
     enum { LARGEST = 1024 };
     static double square[LARGEST][2];
@@ -162,7 +162,7 @@ static void to_unit(const uint32_t digits[2], const uint32_t shift[2], double sq
     }
 }
 
-/* What packets of rays are made by: see vshi_sampler_cells(). */
+/* vshi_sampler_cells() makes packets of rays. */
 TEST(a_block_has_one_point_in_each_cell_and_a_shift_moves_cells_whole) {
     OWNED(vshi_sampler) *sampler = make_sampler(VSH_SAMPLER_SOBOL, MOST, 2);
     for (uint32_t texel = 0; texel < 64; ++texel) {
@@ -214,7 +214,7 @@ TEST(points_asked_for_in_parts_are_the_same) {
         static double whole[MOST][2], parts[MOST][2];
         for (uint32_t texel = 0; texel < 64; ++texel) {
             vshi_sampler_disc(sampler, texel, 0xa0, 0, MOST, whole);
-            for (size_t c = 0; c + 1 < sizeof cuts / sizeof cuts[0]; ++c) {
+            for (size_t c = 0; c + 1 < COUNT_OF(cuts); ++c) {
                 vshi_sampler_disc(sampler, texel, 0xa0, cuts[c], cuts[c + 1] - cuts[c], parts + cuts[c]);
             }
             assert_memory_equal(whole, parts, sizeof whole);

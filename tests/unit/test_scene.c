@@ -1,7 +1,9 @@
-/* Scenes: what their keys become. test_scene_errors.c has what is refused. */
+/* Scenes: what their keys become, and which scenes are refused: wrong, damaged, too large, not there. */
+#include "base/error.h"
 #include "fields.h"
 #include "sandbox/reader.h"
 #include "scenes.h"
+#include "shade/shade.h"
 #include "testing.h"
 #include <jansson.h>
 #include <malloc.h>
@@ -34,7 +36,7 @@ TEST(the_seeds_scene_is_the_one_of_the_techniques) {
         const double p[3] = {between(&counter, -3.5, 3.5), between(&counter, -0.1, 2.2),
                              between(&counter, -3.5, 3.5)};
         const double truth = truth_distance(truth_seeds(), p),
-                     found = vsh_sdf_distance(&scene->casters[0].sdf, p);
+                     found = vshi_sdf_distance(&scene->casters[0].sdf, p);
         /* inside of unions neither is the distance to the nearest surface */
         assert_true((found < 0.0) == (truth < 0.0));
         assert_near(fmax(found, 0.0), fmax(truth, 0.0), 1e-12);
@@ -50,6 +52,43 @@ TEST(the_seeds_scene_is_the_one_of_the_techniques) {
     assert_string_equal(scene->receivers[0].output, VSH_ASSETS "/seeds.exr");
     assert_true(scene->receivers[0].width == 512 && scene->receivers[0].height == 512);
 }
+
+static const char full_scene[] =
+    "{\"casters\": ["
+    " {\"mesh\": \"a.glb\", \"transform\": {\"translate\": [1, 2, 3], \"rotate_deg\": [0, 90, 0],"
+    "  \"scale\": [2, 3, 4]}},"
+    " {\"vdb\": \"/data/b.vdb\", \"grid\": \"rock\", \"transform\": {\"matrix\":"
+    "  [0, -1, 0, 5, 1, 0, 0, 6, 0, 0, 1, 7]}},"
+    " {\"vdb\": \"../c.vdb\"},"
+    " {\"sdf\": {\"op\": \"subtraction\", \"translate\": [9, 8, 7], \"scale\": 3, \"rotate_quat\": [0, 2, 0, "
+    "2],"
+    "  \"of\": [{\"op\": \"smooth_union\", \"smoothing\": 0.25, \"rotate_deg\": [90, 0, 0], \"of\": ["
+    "   {\"shape\": \"capsule\", \"half_height\": 1.5, \"radius\": 0.75},"
+    "   {\"shape\": \"cylinder\", \"half_height\": 2.5, \"radius\": 1.75},"
+    "   {\"shape\": \"cone\", \"half_height\": 3.5, \"radius\": 2.75, \"top_radius\": 0.5}]},"
+    "   {\"op\": \"intersection\", \"of\": [{\"shape\": \"cone\", \"half_height\": 1, \"radius\": 1},"
+    "    {\"shape\": \"box\", \"half_size\": [1, 2, 3]}]}]},"
+    "  \"transform\": {\"rotate_quat\": [0, 0, 1, 1], \"scale\": 0.5}},"
+    " {\"mask\": \"m.png\", \"size\": [2, 3], \"thickness\": 0.5, \"channel\": \"red\", \"threshold\": 0.25,"
+    "  \"invert\": true, \"transform\": {\"translate\": [1, 1, 1]}},"
+    " {\"text\": \"a\\nb\", \"font\": \"f.ttf\", \"height\": 2, \"line_spacing\": 1.5, \"align\": \"right\","
+    "  \"thickness\": 0.25}],"
+    "\"resolution\": 64, \"half_width\": 4.5, \"shell_thickness\": 3,"
+    "\"lights\": ["
+    " {\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0, 2, 0], \"color\": [3, 2, 1]},"
+    " {\"name\": \"lamp\", \"type\": \"sphere\", \"position\": [1, 2, 3], \"radius\": 0.125,"
+    "  \"falloff\": \"quadratic\", \"reach\": 12},"
+    " {\"name\": \"head_-9\", \"type\": \"spot\", \"position\": [4, 5, 6], \"radius\": 0, \"direction\": [0, "
+    "-1, 0],"
+    "  \"inner_deg\": 30, \"outer_deg\": 180, \"falloff\": \"inverse_square\"}],"
+    "\"ao\": {\"distance\": 2.5, \"method\": \"cones\", \"cones\": 32},"
+    "\"rays\": 77, \"sampler\": \"blue\", \"frame\": 5, \"early_rays\": 4, \"max_error\": 0.25, \"error\": "
+    "true,"
+    "\"irradiance\": true, \"method\": \"smooth\", \"max_steps\": 99, \"start_offset\": 2.5,"
+    "\"receivers\": ["
+    " {\"mesh\": \"a.glb\", \"transform\": {\"translate\": [1, 0, 0]}, \"uv_set\": 1, \"size\": [128, 64],"
+    "  \"supersample\": 2, \"padding\": 8, \"output\": \"out/a.png\", \"bits\": 16, \"pack\": \"R=ao\"},"
+    " {\"mesh\": \"b.glb\", \"output\": \"b.exr\"}]}";
 
 TEST(every_key_lands_in_its_field) {
     OWNED(vsh_scene) *scene = parse("dir/x/scene.json", full_scene);
@@ -188,7 +227,7 @@ TEST(a_rectangle_has_its_sides) {
     assert_true(l[0].two_sided == 1 && l[1].two_sided == 0);
 }
 
-TEST(every_example_of_the_reference_is_a_scene) {
+TEST(every_example_in_the_scene_reference_is_valid) {
     static const char start[] = "```json\n", end[] = "\n```";
     size_t size;
     FREED char *text = read_text(VSH_ASSETS "/../docs/scene.md", &size);
@@ -206,7 +245,397 @@ TEST(every_example_of_the_reference_is_a_scene) {
     assert_true(count >= 7);
 }
 
-/* --- What reading a scene's text may take is known before it is read. */
+/* --- scenes that are refused */
+
+/* A scene around a part, and the part's place in it. */
+static const struct frame {
+    const char *before, *after, *place;
+} bare = {"", "", ""},
+  terrain = {"{'casters':[{'heightfield':'a','height':1,'size':[1,1],", "}]}", "casters[0]"},
+  sun = {"{'casters':[{'mesh':'a'}],\n'lights':[{'name':'a','type':'directional','direction':[0,1,0],", "}]}",
+         "lights[0]"},
+  lamp = {"{'casters':[{'mesh':'a'}],\n'lights':[{'name':'a','type':'sphere','position':[0,0,0],", "}]}",
+          "lights[0]"},
+  area = {"{'casters':[{'mesh':'a'}],\n'lights':[{'name':'a','type':'rectangle','position':[0,0,0],", "}]}",
+          "lights[0]"},
+  layer = {"{'casters':[{'mesh':'a'}],\n'layers':[{'name':'a',", "}]}", "layers[0]"},
+  mesh = {"{'casters':[{'mesh':'a',", "}]}", "casters[0]"},
+  tree = {"{'casters':[{'sdf':", "}]}", "casters[0].sdf"},
+  light = {"{'casters':[{'mesh':'a'}],\n'lights':[", "]}", "lights[0]"},
+  receiver = {"{'casters':[{'mesh':'a'}],\n'receivers':[{'mesh':'m','output':'o'},", "]}", "receivers[1]"},
+  caster = {"{'casters':[", "]}", "casters[0]"}, whole = {"{'casters':[{'mesh':'a'}],", "}", ""};
+
+/* The @ stands before the place that the message names, and each ' for ". */
+static const struct {
+    const struct frame *around;
+    const char *part;
+    const char *message; /* behind the part's place; without an @, behind "s.json:" */
+} bad[] = {
+    /* not JSON */
+    {&bare, "", "1:1: '[' or '{' expected near end of file"},
+    {&bare, "{\n 'casters': [nope]}", "2:17: invalid token near 'nope'"},
+    {&bare, "{'casters': 1,\n 'casters': 2}", "2:10: duplicate object key near '\"casters\"'"},
+    {&bare, "{'voxel_size': NaN}", "1:18: invalid token near 'NaN'"},
+    {&bare, "{'voxel_size': 1e999}", "1:20: real number overflow near '1e999'"},
+    {&bare, "{} {}", "1:4: end of file expected near '{'"},
+    /* the whole */
+    {&bare, "@[]", "expected an object, found an array"},
+    {&bare, " @{}", "key \"casters\" is missing: a scene needs it"},
+    {&bare, "{'casters':@[]}", "casters: has 0 items, out of range 1 … 65536"},
+    {&bare, "{'casters':@{}}", "casters: expected an array, found an object"},
+    {&bare, "{\n\t@'castors': []}", "castors: unknown key; did you mean \"casters\"?"},
+    {&whole, "@'é':1,'xyzzy':1", "é: unknown key"},
+    {&whole, "'method':@'ré','xyzzy':1",
+     "method: \"ré\" is none of hard, classic, practical, improved, smooth, cone, rays, adaptive, exact, "
+     "auto"},
+    {&whole, "'method':'cone',@'xyzzy':1", "xyzzy: unknown key"},
+    {&bare, "{'receivers':[],'\\u0061o':{'distance':1,@'cone':1}}",
+     "ao.cone: unknown key; did you mean \"cones\"?"},
+    {&whole, "'voxel_size':@0", "voxel_size: 0 is out of range 1e-12 … 1e+12"},
+    {&layer, "'voxel_size':@1e-13", ".voxel_size: 1e-13 is out of range 1e-12 … 1e+12"},
+    {&whole, "'ao':{'distance':@5e-324}", "ao.distance: 4.94065646e-324 is out of range 1e-12 … 1e+15"},
+    {&whole, "'voxel_size':@'1'", "voxel_size: expected a number, found a string"},
+    {&whole, "'voxel_size':1,@'resolution':9", "resolution: cannot stand beside \"voxel_size\""},
+    {&whole, "'resolution':@99999999999999999999", "resolution: 1e+20 is out of range 2 … 65536"},
+    {&whole, "'resolution':@2.5", "resolution: 2.5 is not a whole number"},
+    /* layers */
+    {&whole, "\n'layers':[@{}]", "layers[0]: key \"name\" is missing: a layer needs it"},
+    {&whole, "\n'layers':[{'name':'a'},{'name':@'a'}]", "layers[1].name: \"a\" is the name of layers[0] too"},
+    {&layer, "'remap':@[0.5,0.5]", ".remap: expected two numbers that rise, found 0.5 and 0.5"},
+    {&layer, "'softness':@-1", ".softness: -1 is out of range 0 … 1000"},
+    {&layer, "'combine':@'max'", ".combine: \"max\" is none of multiply, min"},
+    {&layer, "'lights':[@'sun']", ".lights[0]: \"sun\" is none of the scene's lights"},
+    {&layer, "'voxel_size':1,@'resolution':9", ".resolution: cannot stand beside \"voxel_size\""},
+    {&sun, "'layers':[@'b']", ".layers[0]: \"b\" is none of the scene's layers"},
+    {&sun, "'layers':@'b'", ".layers: expected an array, found a string"},
+    {&mesh, "'layer':@'b'}],'layers':[{'name':'a'", ".layer: \"b\" is none of the scene's layers"},
+    {&whole, "'irradiance':@1", "irradiance: expected true or false, found a number"},
+    {&whole, "'irradiance':@null", "irradiance: expected true or false, found null"},
+    {&whole, "'ao':@{}", "ao: key \"distance\" is missing: ao needs it"},
+    {&whole, "'ao':{'distance':1,'cones':@257}", "ao.cones: 257 is out of range 1 … 256"},
+    {&whole, "'ao':{@'cones':8,'method':'taps','distance':1}", "ao.cones: is no key of ao by taps"},
+    {&whole, "'ao':{'method':@'ray'}",
+     "ao.method: \"ray\" is none of taps, cones, rays, adaptive, exact, auto"},
+    {&whole, "'sampler':@'green'", "sampler: \"green\" is none of sobol, white, blue"},
+    /* casters */
+    {&bare, "{'casters':[{'mesh':'a'},@7]}", "casters[1]: expected an object, found a number"},
+    {&caster, "@{}",
+     ": key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" or \"text\" is missing"},
+    {&caster, "@{'mask':'a','size':1}", ": key \"thickness\" is missing: a mask caster needs it"},
+    {&caster, "{'mask':'a','size':@0,'thickness':1}", ".size: 0 is out of range 0 (excluded) … 1e+15"},
+    {&caster, "{'mask':'a','size':1,'thickness':@0}", ".thickness: 0 is out of range 0 (excluded) … 1e+15"},
+    {&caster, "{'text':'a','font':'f','height':@0,'thickness':1}",
+     ".height: 0 is out of range 0 (excluded) … 1e+15"},
+    {&mesh, "@'thickness':1", ".thickness: is no key of a mesh caster"},
+    {&caster, "{'mask':'a',@'font':'f'}", ".font: is no key of a mask caster"},
+    {&caster, "@{'text':'a','thickness':1,'height':1}", ": key \"font\" is missing: a text caster needs it"},
+    {&caster, "{'text':'a','transform':@{'scale':[1,1,2]},'font':'f','height':1,'thickness':1}",
+     ".transform: shears or scales unevenly, which a text caster cannot"},
+    {&caster, "{@'mush':'a'}", ".mush: unknown key; did you mean \"mesh\"?"},
+    {&caster, "{'mesh':@''}", ".mesh: is empty"},
+    {&caster, "{'vdb':'a',@'mesh':'a'}", ".mesh: cannot stand beside \"vdb\""},
+    {&mesh, "@'grid':'g'", ".grid: is no key of a mesh caster"},
+    {&caster, "{'vdb':'a','transform':@{'scale':[1,1,2]}}",
+     ".transform: shears or scales unevenly, which a vdb caster cannot"},
+    {&mesh, "'transform':{'scale':@0}", ".transform.scale: 0 is out of range 1e-06 … 1000000"},
+    {&mesh, "'transform':{'matrix':@[1,1,0,0,1,1,0,0,0,0,1,0]}",
+     ".transform.matrix: flattens: the determinant of its first three columns is 0"},
+    {&mesh, "'transform':{'matrix':@[1,0,0]}", ".transform.matrix: expected 12 numbers, found 3"},
+    {&mesh, "'transform':{'rotate_quat':@[0,0,0,0]}",
+     ".transform.rotate_quat: is zero, and so points nowhere"},
+    {&mesh, "'transform':{'rotate_deg':[0,0,1],@'rotate_quat':[0,0,0,1]}",
+     ".transform.rotate_quat: cannot stand beside \"rotate_deg\""},
+    {&mesh, "'transform':{'matrix':[1,0,0,0,0,1,0,0,0,0,1,0],@'scale':2}",
+     ".transform.scale: cannot stand beside \"matrix\""},
+    {&mesh, "'transform':{'translate':[0,\n@'',0]}",
+     ".transform.translate[1]: expected a number, found a string"},
+    /* SDF trees */
+    {&tree, "@{}", ": key \"shape\" or \"op\" is missing"},
+    {&tree, "{'shape':@'cube'}",
+     ".shape: \"cube\" is none of sphere, box, torus, plane, capsule, cylinder, cone"},
+    {&tree, "{'op':@'xor'}", ".op: \"xor\" is none of union, intersection, subtraction, smooth_union"},
+    {&tree, "{'op':'union',@'shape':'box'}", ".shape: cannot stand beside \"op\""},
+    {&tree, "@{'shape':'sphere'}", ": key \"radius\" is missing: a sphere needs it"},
+    {&tree, "{'shape':'sphere','radius':@0}", ".radius: 0 is out of range 0 (excluded) … 1e+15"},
+    {&tree, "{'shape':'sphere','radius':1,@'rounding':1}", ".rounding: is no key of a sphere"},
+    {&tree, "{'shape':'box','half_size':[1,1,@-1]}",
+     ".half_size[2]: -1 is out of range 0 (excluded) … 1e+15"},
+    {&tree, "{'shape':'plane','thickness':1,'half_size':@[1,1,1]}",
+     ".half_size: expected 2 numbers, found 3"},
+    {&tree, "@{'op':'union'}", ": key \"of\" is missing: a union needs it"},
+    {&tree, "{'op':'union','of':@[{'shape':'sphere','radius':1}]}",
+     ".of: has 1 items, out of range 2 … 65536"},
+    {&tree, "{'op':'union',@'smoothing':1,'of':[]}", ".smoothing: is no key of a union"},
+    {&tree, "{'op':'union','of':[{'shape':'sphere','radius':1},\n  {'shape':'sphere',\n@'radus':1}]}",
+     ".of[1].radus: unknown key; did you mean \"radius\"?"},
+    {&tree, "{'shape':'sphere','radius':1,'scale':@0}", ".scale: 0 is out of range 1e-06 … 1000000"},
+    {&tree, "{'shape':'sphere','radius':1,'scale':@[1,1,1]}", ".scale: expected a number, found an array"},
+    /* lights */
+    {&sun, "'angle_deg':@180", ".angle_deg: 180 is out of range 0 … 180 (excluded)"},
+    {&light, "{'name':'a','type':'directional','direction':@[0,0,-0.0]}",
+     ".direction: is zero, and so points nowhere"},
+    {&light, "{'name':'a','type':'directional',@'radius':1}", ".radius: is no key of a directional light"},
+    {&light, "{'name':'a',@'typ':'spot'}", ".typ: unknown key; did you mean \"type\"?"},
+    {&light, "@{'name':'a','radius':1}", ": key \"type\" is missing: a light needs it"},
+    {&light, "{'name':'a','type':@'sun'}",
+     ".type: \"sun\" is none of directional, sphere, spot, rectangle, file"},
+    {&light, "@{'type':'sphere','position':[0,0,0]}", ": key \"name\" is missing: a sphere light needs it"},
+    {&light, "@{'name':'a','type':'sphere'}", ": key \"position\" is missing: a sphere light needs it"},
+    {&light, "{'name':@'a b','type':'sphere'}",
+     ".name: \"a b\" cannot name a light: expected 1 … 63 of A … Z, a … z, 0 … 9, _ and -"},
+    {&whole,
+     "\n'lights':[{'name':'a','type':'sphere','position':[0,0,0]},{'name':@'a','type':'sphere','position':[0,"
+     "0,0]}]",
+     "lights[1].name: \"a\" is the name of lights[0] too"},
+    {&light, "@{'name':'a','type':'sphere','position':[0,0,0],'falloff':'quadratic'}",
+     ": key \"reach\" is missing: falloff \"quadratic\" needs it"},
+    {&lamp, "@'reach':1", ".reach: needs falloff \"quadratic\""},
+    {&light, "{'name':'a','type':'spot','position':[0,0,0],'direction':[0,1,0],'inner_deg':@9,'outer_deg':8}",
+     ".inner_deg: 9 is over outer_deg, 8"},
+    {&lamp, "'color':[1,@-1,1]", ".color[1]: -1 is out of range 0 … 1e+15"},
+    {&light, "@{'name':'a','type':'rectangle','position':[0,0,0],'edge_u':[1,0,0]}",
+     ": key \"edge_v\" is missing: a rectangle light needs it"},
+    {&area, "'edge_u':@[0,0,0]", ".edge_u: is zero, and so points nowhere"},
+    {&area, "'two_sided':@1", ".two_sided: expected true or false, found a number"},
+    {&light, "@{'name':'a','type':'rectangle','position':[0,0,0],'edge_u':[1,0,0],'edge_v':[1,1,0]}",
+     ": light 'a': edge_u and edge_v are not at right angles: the cosine between them is 0.707106781, of at "
+     "most 0.001"},
+    {&lamp, "@'edge_u':[1,0,0]", ".edge_u: is no key of a sphere light"},
+    /* heightfields */
+    {&caster, "@{'heightfield':'a','height':1}",
+     ": key \"extent\" is missing: a heightfield caster needs it"},
+    {&caster, "@{'heightfield':'a','size':[1,1]}",
+     ": key \"height\" is missing: a heightfield caster needs it"},
+    {&caster, "{'heightfield':'a','height':1,'size':[1,@0]}", ".size[1]: 0 is out of range 1e-12 … 1e+12"},
+    {&terrain, "'base':@0", ".base: 0 is out of range 0 (excluded) … 1e+12"},
+    {&mesh, "@'height':1", ".height: is no key of a mesh caster"},
+    {&terrain, "'transform':@{'scale':[1,1,2]}",
+     ".transform: shears or scales unevenly, which a heightfield caster cannot"},
+    {&terrain, "@'voxelised':true", ".voxelised: is no key of a heightfield caster"},
+    /* spheres */
+    {&caster, "{'spheres':@7}", ".spheres: expected a file's name or an array of [x, y, z, radius]"},
+    {&caster, "{'spheres':@''}", ".spheres: is empty"},
+    {&caster, "{'spheres':@[]}", ".spheres: is empty"},
+    {&caster, "{'spheres':[[1,2,3,4],@[1,2,3]]}", ".spheres[1]: expected 4 numbers, found 3"},
+    {&caster, "{'spheres':[[1,2,3,@-4]]}", ".spheres[0][3]: -4 is out of range 0 (excluded) … 1e+15"},
+    {&caster, "{'spheres':[[1,2,@1e16,4]]}", ".spheres[0][2]: 1e+16 is out of range -1e+15 … 1e+15"},
+    {&caster, "{'spheres':[[1,2,3,4]],'transform':@{'scale':[1,1,2]}}",
+     ".transform: shears or scales unevenly, which a caster of spheres cannot"},
+    {&receiver, "{'mesh':'m',@'heightfield':'h'}", ".heightfield: cannot stand beside \"mesh\""},
+    {&receiver, "{'heightfield':'h',@'uv_set':0}", ".uv_set: is no key of a heightfield receiver"},
+    {&receiver, "@{'heightfield':'h','height':1,'output':'p'}",
+     ": key \"extent\" is missing: a heightfield receiver needs it"},
+    {&receiver, "{'mesh':'m',@'plane':{}}", ".plane: cannot stand beside \"mesh\""},
+    {&receiver, "{'plane':@{},'output':'p'}", ".plane: key \"size\" is missing: a plane needs it"},
+    {&receiver, "{'plane':{'size':[1,1],'normal':@[0,0,0]},'output':'p'}",
+     ".plane.normal: is zero, and so points nowhere"},
+    {&receiver, "{'plane':{},@'uv_set':1}", ".uv_set: is no key of a plane receiver"},
+    {&bare, "{'region':@[0,0,1,1]}", "region: belongs to flat scenes, which 'vdbshade flat' bakes"},
+    /* receivers */
+    {&receiver, "@{}", ": key \"mesh\" is missing: a receiver needs it"},
+    {&receiver, "@{'mesh':'m'}", ": key \"output\" is missing: a receiver needs it"},
+    {&receiver, "{'output':@'o','mesh':'m'}", ".output: \"o\" is the output of receivers[0] too"},
+    {&receiver, "{'size':@0}", ".size: 0 is out of range 1 … 65536"},
+    {&receiver, "{'size':@[1]}", ".size: expected 2 numbers, found 1"},
+    {&receiver, "{'size':[1,@0]}", ".size[1]: 0 is out of range 1 … 65536"},
+    {&receiver, "{'bits':@12}", ".bits: 12 is none of 0, 8, 16, 32"},
+    {&receiver, "{'pack':@''}", ".pack: is empty"},
+};
+
+/* Takes the @ out of a text and writes quotes; the message then begins with the line and the column of the @.
+ */
+static void take_mark(char *text, const char *message, char *expected, size_t size) {
+    char *mark = strchr(text, '@');
+    int line = 1, column = 1;
+    for (char *c = text; *c != '\0'; ++c) {
+        *c = *c == '\'' ? '"' : *c;
+        if (mark != NULL && c < mark) {
+            column = *c == '\n' ? 1 : column + ((*c & 0xc0) != 0x80);
+            line += *c == '\n';
+        }
+    }
+    if (mark == NULL) {
+        snprintf(expected, size, "s.json:%s", message);
+    } else {
+        memmove(mark, mark + 1, strlen(mark));
+        snprintf(expected, size, "s.json:%d:%d: %s", line, column, message);
+    }
+}
+
+TEST(errors_name_line_column_and_key) {
+    size_t wrong = 0;
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
+        const struct frame *f = bad[i].around;
+        OWNED(vsh_scene) *scene = NULL;
+        char text[512], message[512], expected[sizeof failure.message];
+        snprintf(message, sizeof message, "%s%s", f->place, bad[i].message);
+        assert_true(snprintf(text, sizeof text, "%s%s%s", f->before, bad[i].part, f->after) <
+                    (int)sizeof text);
+        take_mark(text, message, expected, sizeof expected);
+        const vsh_result result = vshi_scene_parse("s.json", text, strlen(text), NULL, &scene, &failure);
+        if (result != VSH_ERROR_INPUT || scene != NULL || strcmp(failure.message, expected) != 0) {
+            print_error("%s\n  expected %s\n  found    %s\n", text, expected, failure.message);
+            ++wrong;
+        }
+    }
+    assert_int_equal(wrong, 0);
+}
+
+/* Parses text of any bytes; it must be refused with this in the message. */
+static void assert_refused(const char *text, size_t size, const char *message) {
+    vsh_scene *scene = NULL;
+    assert_int_equal(vshi_scene_parse("s", text, size, NULL, &scene, &failure), VSH_ERROR_INPUT);
+    assert_null(scene);
+    assert_that(strncmp(failure.message, "s:", 2) == 0 && strstr(failure.message, message) != NULL &&
+                    strpbrk(failure.message, "\r\n") == NULL,
+                "'%s', expected '%s'", failure.message, message);
+}
+
+/* Jansson ends a number at a byte of 0, and reads on behind it. */
+TEST(bytes_of_zero_are_refused_with_their_place) {
+    static const char text[] = "{\"casters\": [],\n \"resolution\": 6\0, \"ck\": 0}";
+    assert_refused(text, sizeof text - 1, "s:2:17: a byte of 0, expected text");
+}
+
+TEST(a_seeds_scene_cut_anywhere_is_an_error) {
+    size_t size;
+    FREED char *text = read_text(seeds_path, &size);
+    const size_t end = (size_t)(strrchr(text, '}') - text);
+    for (size_t cut = 0; cut <= end; ++cut) {
+        FREED char *piece =
+            malloc(cut + 1); /* of just this size, so that a sanitizer sees a read behind it */
+        assert_non_null(piece);
+        memcpy(piece, text, cut);
+        assert_refused(piece, cut, "");
+    }
+}
+
+#define SPHERE "{\"shape\":\"sphere\",\"radius\":1}"
+
+/* `head` and `tail` with `count` times `open` and then `close` between them, around a sphere. */
+static char *repeated(const char *head, const char *open, const char *close, size_t count, const char *tail) {
+    char *text = malloc(256 + count * (strlen(open) + strlen(close)));
+    char *at = stpcpy(text, head);
+    for (size_t i = 0; i < count; ++i) {
+        at = stpcpy(at, open);
+    }
+    at = stpcpy(at, SPHERE);
+    for (size_t i = 0; i < count; ++i) {
+        at = stpcpy(at, close);
+    }
+    strcpy(at, tail);
+    return text;
+}
+
+/* Each tree has the node count that is expected; 0: it is refused with the message. */
+TEST(trees_nest_64_levels_and_have_65536_nodes) {
+    static const char nest[] = "{\"casters\":[{\"sdf\":",
+                      list[] = "{\"casters\":[{\"sdf\":{\"op\":\"union\",\"of\":[";
+    static const struct {
+        const char *head, *open, *close, *tail;
+        size_t count, nodes;
+        const char *message;
+    } trees[] = {
+        {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 63, 2 * 63 + 1, NULL},
+        {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 64, 0, ""},
+        {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 200, 0, ""},
+        {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 1000, 0, ""},
+        {nest, "{\"op\":\"union\",\"of\":[" SPHERE ",", "]}", "}]}", 5000, 0, ""},
+        /* n leaves make 2 n - 1 nodes */
+        {list, SPHERE ",", "", "]}}]}", 32767, 65535, NULL},
+        {list, SPHERE ",", "", "]}}]}", 32768, 0,
+         "of[32768]: is node 65537 of its tree, out of range 1 … 65536"},
+    };
+    for (size_t i = 0; i < COUNT_OF(trees); ++i) {
+        FREED char *text =
+            repeated(trees[i].head, trees[i].open, trees[i].close, trees[i].count, trees[i].tail);
+        if (trees[i].nodes == 0) {
+            assert_refused(text, strlen(text), trees[i].message);
+        } else {
+            OWNED(vsh_scene) *made = parse("s", text);
+            assert_int_equal(made->casters[0].sdf.node_count, trees[i].nodes);
+        }
+    }
+}
+
+TEST(scales_of_nested_nodes_have_a_limit_together) {
+    static const char text[] =
+        "{\"casters\":[{\"sdf\":{\"op\":\"union\",\"scale\":1e6,\"of\":[{\"op\":\"union\",\"scale\":1e6,"
+        "\"of\":["
+        "{\"shape\":\"sphere\",\"radius\":1,\"scale\":1e6}," SPHERE "]}," SPHERE "]}}]}";
+    assert_refused(text, sizeof text - 1, "casters[0].sdf.of[0].of[0]: the scales of all levels make 1e+18");
+}
+
+TEST(byte_order_marks_and_escapes_are_read) {
+    OWNED(vsh_scene) *made = parse("s", "\xef\xbb\xbf{\"c\\u0061sters\":[{\"mesh\":\"\\\"\\\\\\u00e9\"}]}");
+    assert_string_equal(made->casters[0].path, "\"\\é");
+}
+
+TEST(messages_stay_one_line_for_any_key) {
+    char text[4096], key[2048];
+    memset(key, 'k', sizeof key - 1);
+    key[sizeof key - 1] = '\0';
+    snprintf(text, sizeof text, "{\"casters\":[{\"mesh\":\"a\"}],\"a\\nb%s\":1}", key);
+    assert_refused(text, strlen(text), "s:1:27: a?bkkk");
+    assert_refused(text, strlen(text), "…: unknown key");
+}
+
+/* Otherwise the library would refuse a number of a scene file later, without line and key. */
+TEST(the_library_accepts_all_values_that_the_table_of_keys_accepts) {
+    const vshi_table tables[] = {vshi_scene_table, vshi_ao_table};
+    size_t tried = 0;
+    for (size_t t = 0; t < 2; ++t) {
+        for (size_t k = 0; k < 2 * tables[t].key_count; ++k) {
+            const vshi_key *key = &tables[t].keys[k / 2];
+            const double value = k % 2 ? key->highest : key->lowest;
+            vsh_scene made = vsh_scene_default();
+            vsh_shade_options full;
+            if (key->kind == VSHI_NUMBER) {
+                *(double *)((char *)&made + key->offset) = value;
+            } else if (key->kind == VSHI_INTEGER) {
+                *(int32_t *)((char *)&made + key->offset) = (int32_t)value;
+            } else {
+                continue;
+            }
+            assert_int_equal(key->flags & (VSHI_ABOVE | VSHI_BELOW), 0);
+            assert_that(vshi_shade_options_resolve(&made.shade, &full, &failure) == VSH_OK, "%s %g: %s",
+                        key->name, value, failure.message);
+            ++tried;
+        }
+    }
+    assert_true(tried >= 20);
+}
+
+TEST(bytes_that_are_no_text_do_not_reach_messages) {
+    vshi_fail(&failure, VSH_ERROR_INPUT, "%s: type '%s' × %.4s", "caf\xe9.json", "\xff\xc0\x80 é", "abc…");
+    assert_string_equal(failure.message, "caf?.json: type '??? é' × abc?");
+}
+
+TEST(files_that_cannot_be_read_are_refused) {
+    char large[] = "scene-XXXXXX";
+    const int file = mkstemp(large);
+    assert_true(file >= 0 && ftruncate(file, (off_t)1 << 36) == 0);
+    close(file);
+    const struct {
+        const char *path;
+        vsh_result code;
+        const char *message;
+    } files[] = {
+        {"no/such.json", VSH_ERROR_READ, "no/such.json: cannot be read: No such file or directory"},
+        {VSH_ASSETS, VSH_ERROR_READ, ""},
+        {"/dev/zero", VSH_ERROR_READ, "/dev/zero: cannot be read: it is no regular file"},
+        {large, VSH_ERROR_LIMIT, ": is larger than the 67108864 bytes that such a file may have"},
+    };
+    for (size_t i = 0; i < COUNT_OF(files); ++i) {
+        vsh_scene *made = NULL;
+        assert_int_equal(vsh_scene_read(files[i].path, NULL, &made, &failure), files[i].code);
+        assert_null(made);
+        assert_non_null(strstr(failure.message, files[i].message));
+    }
+    unlink(large);
+}
+
+/* --- the memory of reading a scene's text is known before it is read */
 
 /* A folder of this run's own: the sanitizers' build runs beside this one in the same working folder. */
 static char folder[] = "/tmp/vdbshade-scene-memory-XXXXXX";
@@ -215,7 +644,6 @@ static char file[sizeof folder + sizeof "/memory.json"];
 /* An array of `count` times a piece, which is also written to the file. */
 static char *write_scene(const char *piece, size_t count) {
     char *text = malloc(count * (strlen(piece) + 1) + 3), *at = text;
-    assert_non_null(text);
     for (size_t i = 0; i < count; ++i) {
         at = stpcpy(stpcpy(at, i == 0 ? "[" : ","), piece);
     }
@@ -255,7 +683,7 @@ static size_t least_limit(void) {
 
 TEST(reading_takes_less_than_the_least_limit_that_it_passes) {
     if (VSHI_SANITIZED) {
-        skip(); /* whose allocator takes more, and does not tell */
+        skip(); /* their allocator takes more, and does not report it */
     }
     static const char *const pieces[] = {
         "{}",
@@ -268,14 +696,14 @@ TEST(reading_takes_less_than_the_least_limit_that_it_passes) {
         "[1,2,3]",
         "[1,2,3,4,5,6,7,8,9]",
         "{\"a\":1,\"b\":2,\"c\":3,\"d\":4,\"e\":5,\"f\":6,\"g\":7,\"h\":8,\"i\":9}"};
-    for (size_t i = 0; i < sizeof pieces / sizeof pieces[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(pieces); ++i) {
         for (size_t count = 900; count <= 9000; count *= 3) {
             FREED char *text = write_scene(pieces[i], count);
             const size_t before = taken();
-            json_t *tree = json_loads(text, 0, NULL);
-            assert_non_null(tree);
+            json_t *root = json_loads(text, 0, NULL);
+            assert_non_null(root);
             const size_t takes = taken() - before + strlen(text);
-            json_decref(tree);
+            json_decref(root);
             const size_t limit = least_limit();
             assert_that(takes <= limit && limit <= 8 * takes, "%zu times %s: takes %zu, passes at %zu", count,
                         pieces[i], takes, limit);

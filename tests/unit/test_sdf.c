@@ -77,7 +77,7 @@ TEST(every_shape_gives_the_distance_to_its_surface) {
         for (int i = 0; i < 30; ++i) {
             double p[3];
             random_point(1.2, p);
-            const double d = vsh_sdf_distance(&sdf, p);
+            const double d = vshi_sdf_distance(&sdf, p);
             const double truth = brute_force(&node, p, pitch);
             assert_that(fabs(d) <= fabs(truth) + 1e-9 && fabs(d) >= fabs(truth) - 1.8 * pitch &&
                             (d < 0.0) == (truth < 0.0),
@@ -90,21 +90,21 @@ TEST(closed_forms_hold) {
     vsh_sdf_node node = shape_of(VSH_SDF_BOX);
     const vsh_sdf sdf = {&node, 1};
     const double corner[3] = {1.0, 0.8, 1.3};
-    assert_float_equal(vsh_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4), 1e-12);
+    assert_float_equal(vshi_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4), 1e-12);
     node.rounding = 0.1;
-    assert_float_equal(vsh_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4) - 0.1, 1e-12);
+    assert_float_equal(vshi_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4) - 0.1, 1e-12);
     node = shape_of(VSH_SDF_CONE);
     node.minor_radius = 0.0;
     const double above[3] = {0.0, 1.0, 0.0};
-    assert_float_equal(vsh_sdf_distance(&sdf, above), 0.6, 1e-12);
+    assert_float_equal(vshi_sdf_distance(&sdf, above), 0.6, 1e-12);
     node = shape_of(VSH_SDF_TORUS);
     const double middle[3] = {0.0, 0.0, 0.0};
-    assert_float_equal(vsh_sdf_distance(&sdf, middle), 0.6, 1e-12);
+    assert_float_equal(vshi_sdf_distance(&sdf, middle), 0.6, 1e-12);
     node = shape_of(VSH_SDF_PLANE);
     const double over[3] = {0.1, 2.0, 0.1};
-    assert_float_equal(vsh_sdf_distance(&sdf, over), 2.0, 1e-12);
+    assert_float_equal(vshi_sdf_distance(&sdf, over), 2.0, 1e-12);
     const double nowhere[3] = {NAN, 0.0, 0.0};
-    assert_true(isnan(vsh_sdf_distance(&sdf, nowhere)));
+    assert_true(isnan(vshi_sdf_distance(&sdf, nowhere)));
 }
 
 static void turn_somehow(vsh_sdf_node *node) {
@@ -137,7 +137,7 @@ TEST(no_tree_changes_by_more_than_one_per_unit) {
             vsh_sdf_node nodes[3];
             make_tree(nodes, pair / 7, pair % 7, operation);
             const vsh_sdf sdf = {nodes, 3};
-            assert_ok(vsh_sdf_check(&sdf, &failure));
+            assert_ok(vshi_sdf_check(&sdf, &failure));
             for (int i = 0; i < 200; ++i) {
                 const double reach = i % 2 == 0 ? 3.0 : 0.01;
                 double a[3], b[3];
@@ -145,7 +145,7 @@ TEST(no_tree_changes_by_more_than_one_per_unit) {
                     a[j] = between(&counter, -2.0, 2.0);
                     b[j] = a[j] + between(&counter, -reach, reach);
                 }
-                const double change = fabs(vsh_sdf_distance(&sdf, a) - vsh_sdf_distance(&sdf, b));
+                const double change = fabs(vshi_sdf_distance(&sdf, a) - vshi_sdf_distance(&sdf, b));
                 assert_true(change <= norm(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + 1e-12);
             }
         }
@@ -159,18 +159,18 @@ TEST(the_box_holds_the_surface_and_touches_it_for_shapes) {
         make_tree(nodes, round % 7, (round / 7) % 7, operation);
         vsh_sdf sdf = {nodes, 3};
         double low[3], high[3];
-        vsh_sdf_bounds(&sdf, low, high);
+        vshi_sdf_bounds(&sdf, low, high);
         for (int i = 0; i < 2000; ++i) {
             double p[3];
             random_point(4.0, p);
-            if (vsh_sdf_distance(&sdf, p) < 0.0) {
+            if (vshi_sdf_distance(&sdf, p) < 0.0) {
                 for (int j = 0; j < 3; ++j) {
                     assert_true(p[j] >= low[j] && p[j] <= high[j]);
                 }
             }
         }
         sdf.node_count = 1;
-        vsh_sdf_bounds(&sdf, low, high);
+        vshi_sdf_bounds(&sdf, low, high);
         for (int axis = 0; axis < 3; ++axis) { /* the face of the box must come near the shape somewhere */
             double nearest = INFINITY;
             for (int i = 0; i < 80 * 80; ++i) {
@@ -179,7 +179,7 @@ TEST(the_box_holds_the_surface_and_touches_it_for_shapes) {
                 const int u = (axis + 1) % 3, v = (axis + 2) % 3;
                 p[u] = low[u] + (high[u] - low[u]) * (i % 80 + 0.5) / 80.0;
                 p[v] = low[v] + (high[v] - low[v]) * (floor(i / 80.0) + 0.5) / 80.0;
-                nearest = fmin(nearest, vsh_sdf_distance(&sdf, p));
+                nearest = fmin(nearest, vshi_sdf_distance(&sdf, p));
             }
             assert_true(nearest > -1e-9 && nearest < 0.06);
         }
@@ -200,16 +200,16 @@ TEST(operations_are_the_sets_operations) {
         for (int i = 0; i < 300; ++i) {
             double p[3];
             random_point(2.0, p);
-            const int a = vsh_sdf_distance(&left, p) < 0.0, b = vsh_sdf_distance(&right, p) < 0.0;
+            const int a = vshi_sdf_distance(&left, p) < 0.0, b = vshi_sdf_distance(&right, p) < 0.0;
             nodes[2].shape = VSH_SDF_UNION;
-            const double united = vsh_sdf_distance(&both, p);
+            const double united = vshi_sdf_distance(&both, p);
             assert_int_equal(united < 0.0, a || b);
             nodes[2].shape = VSH_SDF_INTERSECTION;
-            assert_int_equal(vsh_sdf_distance(&both, p) < 0.0, a && b);
+            assert_int_equal(vshi_sdf_distance(&both, p) < 0.0, a && b);
             nodes[2].shape = VSH_SDF_SUBTRACTION;
-            assert_int_equal(vsh_sdf_distance(&both, p) < 0.0, a && !b);
+            assert_int_equal(vshi_sdf_distance(&both, p) < 0.0, a && !b);
             nodes[2].shape = VSH_SDF_SMOOTH_UNION;
-            const double smooth = vsh_sdf_distance(&both, p);
+            const double smooth = vshi_sdf_distance(&both, p);
             assert_true(smooth <= united && smooth >= united - 0.25 * nodes[2].smoothing);
         }
     }
@@ -225,16 +225,16 @@ TEST(a_turned_scaled_shape_is_the_shape_seen_from_elsewhere) {
     node.scale = 2.0;
     node.translation[0] = 10.0;
     const double end[3] = {10.0, 0.0, -2.4};
-    assert_float_equal(vsh_sdf_distance(&sdf, end), 1.0, 1e-12);
+    assert_float_equal(vshi_sdf_distance(&sdf, end), 1.0, 1e-12);
     double low[3], high[3];
-    vsh_sdf_bounds(&sdf, low, high);
+    vshi_sdf_bounds(&sdf, low, high);
     assert_float_equal(low[0], 10.0 - 1.8, 1e-12);
     assert_float_equal(high[2], 1.4, 1e-12);
 }
 
 static void refused(const vsh_sdf_node *nodes, size_t count, const char *part) {
     const vsh_sdf sdf = {nodes, count};
-    assert_int_equal(vsh_sdf_check(&sdf, &failure), VSH_ERROR_INPUT);
+    assert_int_equal(vshi_sdf_check(&sdf, &failure), VSH_ERROR_INPUT);
     assert_that(strstr(failure.message, part) != NULL, "'%s' does not hold '%s'", failure.message, part);
 }
 
@@ -257,7 +257,7 @@ TEST(bad_nodes_are_refused_by_name) {
         {&nodes[1].minor_radius, -0.1, "node 1 (cone): minor_radius -0.1"},
         {&root->smoothing, 0.0, "node 2 (smooth union): smoothing 0"},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const double old = *cases[i].field;
         *cases[i].field = cases[i].value;
         refused(nodes, 3, cases[i].part);
@@ -277,7 +277,6 @@ TEST(bad_nodes_are_refused_by_name) {
 TEST(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works) {
     enum { SHAPES = 3000 };
     FREED vsh_sdf_node *nodes = malloc((2 * SHAPES - 1) * sizeof *nodes);
-    assert_non_null(nodes);
     size_t count = 0;
     for (int i = 0; i < SHAPES; ++i) {
         nodes[count] = vsh_sdf_node_default();
@@ -291,9 +290,9 @@ TEST(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works) {
         }
     }
     const vsh_sdf deep = {nodes, 2 * 2000 - 1};
-    assert_ok(vsh_sdf_check(&deep, &failure));
+    assert_ok(vshi_sdf_check(&deep, &failure));
     const double p[3] = {1500.0, 3.0, 0.0};
-    assert_float_equal(vsh_sdf_distance(&deep, p), 2.0, 1e-12);
+    assert_float_equal(vshi_sdf_distance(&deep, p), 2.0, 1e-12);
     refused(nodes, count, "deep");
 }
 
@@ -335,7 +334,7 @@ TEST(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it) {
     size_t left_out = 0, operations = 0;
     for (int t = 0; t < TREES; ++t) {
         const vsh_sdf sdf = {nodes, random_tree(nodes, SHAPES, t % 2 == 0)};
-        assert_ok(vsh_sdf_check(&sdf, &failure));
+        assert_ok(vshi_sdf_check(&sdf, &failure));
         for (int i = 0; i < PLACES; ++i) {
             const double radius = pow(10.0, between(&counter, -3.0, 0.5));
             double middle[3];
@@ -351,13 +350,11 @@ TEST(a_tree_narrowed_to_a_ball_has_the_same_bits_in_it) {
                 random_point(1.0, way);
                 const double length = norm(way[0], way[1], way[2]);
                 const double far = (k % 2 == 0 ? radius : between(&counter, 0.0, radius)) / length;
-                for (int axis = 0; axis < 3; ++axis) {
-                    p[k][axis] = middle[axis] + far * way[axis];
-                }
+                go_along(middle, far, way, p[k]);
             }
             vshi_sdf_distances_within(&sdf, keep, POINTS, (const double(*)[3])p, less);
             for (int k = 0; k < POINTS; ++k) {
-                const double whole = vsh_sdf_distance(&sdf, p[k]);
+                const double whole = vshi_sdf_distance(&sdf, p[k]);
                 assert_memory_equal(&whole, &less[k], sizeof whole);
             }
         }

@@ -1,9 +1,10 @@
-/* vsh_lightmap_stitch(): values on both sides of charts' borders agree, and nothing else moves. */
+/* stitch_one(): values on both sides of charts' borders agree, and nothing else moves. */
+#include "bake/seams.h"
 #include "seams.h"
 #include "testing.h"
 
 static const double E = 0.02;
-static const double UNSEEN = 0.5 / 255.0; /* half a step of what is shown */
+static const double UNSEEN = 0.5 / 255.0; /* half a step of 8 bits */
 
 /* One side of a border at x = 1, 40 units long: quads whose edges along it end at these places, their chart a
  * strip of 5 texels whose border is the column `column`. */
@@ -30,74 +31,73 @@ static charts_mesh *two_strips(int pieces, double left, double right) {
     return m;
 }
 
-/* Values are 0.5 left of the gap between the strips and 0.53 right of it. */
-static float *plane_of_columns(void) {
-    float *plane = new_plane(0.5f);
+/* `left` in columns below `from`, else `right`. */
+static float *plane_of_columns(size_t from, float left, float right) {
+    float *plane = new_plane(left);
     for (size_t t = 0; t < TEXELS; ++t) {
-        plane[t] = t % SIDE < 15 ? 0.5f : 0.53f;
+        plane[t] = t % SIDE < from ? left : right;
     }
     return plane;
 }
 
+static void assert_columns_moved(const float *plane, double left, double right) {
+    for (size_t row = 20; row < 40; ++row) {
+        assert_true(fabs((double)plane[row * SIDE + 10] - 0.5 - left) < 1e-4);
+        assert_true(fabs((double)plane[row * SIDE + 20] - 0.53 + right) < 1e-4);
+        assert_true(plane[row * SIDE + 9] == 0.5f && plane[row * SIDE + 21] == 0.53f);
+    }
+}
+
 /* The first square is 0.5, all else 0.52. */
-static void fill_squares(float *plane) {
+static float *plane_of_squares(void) {
+    float *plane = new_plane(0.5f);
     for (size_t i = 0; i < TEXELS; ++i) {
         plane[i] = is_first(i) ? 0.5f : 0.52f;
     }
+    return plane;
 }
 
 /* A column of each side is read: (a, b) go to the minimum of 2 (d + a - b)² + keep (a² + b²), as two places
  * fall to a texel, however many edges the border has. */
-TEST(two_columns_meet_where_the_closed_form_says) {
+TEST(two_columns_meet_at_the_closed_form) {
     const int pieces[] = {1, 7, 100};
-    for (size_t i = 0; i < 2 * sizeof pieces / sizeof pieces[0]; ++i) {
+    for (size_t i = 0; i < 2 * COUNT_OF(pieces); ++i) {
         FREED charts_mesh *m = two_strips(pieces[i / 2], 10.5, 20.5);
         OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
-        FREED float *plane = plane_of_columns();
+        FREED float *plane = plane_of_columns(15, 0.5f, 0.53f);
         const vsh_lightmap map = {.ao = plane};
         vsh_stitch_options options = vsh_stitch_options_default();
         options.keep = i % 2 == 0 ? options.keep : 1.0;
         vsh_stitch_report report;
-        assert_ok(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, &report, &failure));
+        assert_ok(stitch_one(charts, &map, 0, &options, NULL, &report, &failure));
         assert_int_equal(report.seams, pieces[i / 2]);
         assert_int_equal(report.crowded, 0);
         assert_true(pieces[i / 2] > 1 || report.places == 81);
         const double move = 2.0 * 0.03 / (4.0 + options.keep);
-        for (size_t row = 20; row < 40; ++row) {
-            assert_true(fabs((double)plane[row * SIDE + 10] - 0.5 - move) < 1e-4);
-            assert_true(fabs((double)plane[row * SIDE + 20] - 0.53 + move) < 1e-4);
-            assert_true(plane[row * SIDE + 9] == 0.5f && plane[row * SIDE + 21] == 0.53f);
-        }
+        assert_columns_moved(plane, move, move);
         assert_true(fabs(report.before - 0.03) < 1e-6 &&
                     report.after < 0.08 * 0.03 * sqrt(options.keep * 100.0));
     }
 }
 
 /* a² + b² / 10 is what it costs, so b goes ten times as far. */
-TEST(what_is_guessed_gives_way_to_what_was_baked) {
+TEST(guessed_texels_move_more_than_baked_ones) {
     FREED charts_mesh *m = two_strips(1, 10.5, 20.5);
-    FREED float *plane = plane_of_columns(), *coverage = new_plane(1.0f);
-    for (size_t t = 0; t < TEXELS; ++t) {
-        coverage[t] = t % SIDE == 20 ? 0.0f : 1.0f;
+    FREED float *plane = plane_of_columns(15, 0.5f, 0.53f), *coverage = new_plane(1.0f);
+    for (size_t t = 20; t < TEXELS; t += SIDE) {
+        coverage[t] = 0.0f;
     }
     const vsh_lightmap map = {.ao = plane, .coverage = coverage};
     stitch(&m->mesh, 1, &map, 0, E);
     const double keep = 0.01, move = 4.0 * 0.03 / (44.0 + keep);
-    for (size_t row = 20; row < 40; ++row) {
-        assert_true(fabs((double)plane[row * SIDE + 10] - 0.5 - move) < 1e-4);
-        assert_true(fabs((double)plane[row * SIDE + 20] - 0.53 + 10.0 * move) < 1e-4);
-    }
+    assert_columns_moved(plane, move, 10.0 * move);
 }
 
-/* What lies beyond the image is its edge again, for lookups. */
+/* Lookups beyond the image read its edge. */
 TEST(borders_at_the_edge_of_the_image_read_the_edge) {
     FREED charts_mesh *m = two_strips(1, SIDE, 0.0);
-    FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
-    for (size_t t = 0; t < TEXELS; ++t) {
-        plane[t] = before[t] = t % SIDE > 32 ? 0.5f : 0.53f;
-    }
-    const vsh_lightmap map = {.ao = plane};
-    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+    FREED float *plane = plane_of_columns(33, 0.53f, 0.5f), *before = plane_of_columns(33, 0.53f, 0.5f);
+    const vsh_stitch_report report = stitch_ao(m, plane, E);
     assert_int_equal(report.places, 81);
     assert_true(report.texels > 80 && report.texels < 86); /* 41 or 42 of each side */
     assert_true(across(m, plane, 1, 2, 4, 7) < UNSEEN);
@@ -146,48 +146,26 @@ TEST(a_cylinder_with_a_ramp_around_it_has_no_jump_at_its_seam) {
 
 TEST(charts_that_are_turned_or_mirrored_agree_along_their_border) {
     const double turns[] = {0.0, 90.0, 37.0, 180.0, -61.5};
-    for (size_t t = 0; t < 2 * sizeof turns / sizeof turns[0]; ++t) {
+    for (size_t t = 0; t < 2 * COUNT_OF(turns); ++t) {
         FREED charts_mesh *m = two_squares(turns[t / 2], t % 2 == 0 ? 1.0 : -1.0);
         FREED float *plane = new_plane(0.5f);
         for (size_t i = 0; i < TEXELS;
              ++i) { /* a ramp along the border of the first, another value in the second */
             plane[i] = is_first(i) ? 0.5f + 0.01f * (float)(i / SIDE) / SIDE : 0.52f;
         }
-        const vsh_lightmap map = {.ao = plane};
         assert_true(across(m, plane, 1, 2, 4, 7) > 0.015);
-        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+        const vsh_stitch_report report = stitch_ao(m, plane, E);
         assert_int_equal(report.seams, 1);
         assert_true(across(m, plane, 1, 2, 4, 7) < UNSEEN);
     }
 }
 
-/* What it costs to move is what is left: without it nothing is. */
-TEST(the_less_moving_costs_the_less_is_left) {
-    FREED charts_mesh *m = two_squares(37.0, 1.0);
-    OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
-    FREED float *plane = new_plane(0.5f);
-    double last = INFINITY;
-    for (double keep = 1.0; keep > 1e-3 / 2; keep /= 10.0) {
-        fill_squares(plane);
-        const vsh_lightmap map = {.ao = plane};
-        vsh_stitch_options options = vsh_stitch_options_default();
-        options.keep = keep;
-        options.max_change = 1.0;
-        vsh_stitch_report report;
-        assert_ok(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, &report, &failure));
-        assert_true(fabs(report.before - 0.02) < 1e-6 && report.after < 0.5 * last);
-        last = report.after;
-    }
-    assert_true(last < 1e-4);
-}
-
 TEST(charts_of_equal_values_stay_to_the_bit) {
     const float values[] = {0.3f, 1.0f / 3.0f, 0.0f, 1.0f, 0.7654321f};
-    for (size_t v = 0; v < sizeof values / sizeof values[0]; ++v) {
+    for (size_t v = 0; v < COUNT_OF(values); ++v) {
         FREED charts_mesh *m = two_squares(23.0 + 31.0 * (double)v, 1.0);
         FREED float *plane = new_plane(values[v]), *before = new_plane(values[v]);
-        const vsh_lightmap map = {.ao = plane};
-        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+        const vsh_stitch_report report = stitch_ao(m, plane, E);
         assert_true(report.places > 30 && report.before == 0.0 && report.after == 0.0);
         assert_memory_equal(plane, before, TEXELS * sizeof *plane);
     }
@@ -196,7 +174,7 @@ TEST(charts_of_equal_values_stay_to_the_bit) {
 /* Noise, which asks for far more than the limit. */
 TEST(no_value_moves_by_more_than_the_limit_or_out_of_its_range) {
     const double limits[] = {0.0, 0.003, 0.02, 1.0};
-    for (size_t l = 0; l < sizeof limits / sizeof limits[0]; ++l) {
+    for (size_t l = 0; l < COUNT_OF(limits); ++l) {
         FREED charts_mesh *m = two_squares(37.0, 1.0);
         FREED float *plane = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light),
                     *coverage = new_plane(0.0f);
@@ -230,7 +208,7 @@ TEST(no_value_moves_by_more_than_the_limit_or_out_of_its_range) {
                 light_beyond += coverage[i] != 0.0f && light_by > 5.0 * limits[l];
             }
         }
-        assert_true(limits[l] == 0.0 || light_beyond > 20); /* its limit is in parts of what is near */
+        assert_true(limits[l] == 0.0 || light_beyond > 20); /* its limit is a part of the light nearby */
         assert_true(moved > 40);
         assert_true(limits[l] == 0.0 || limits[l] == 1.0 || at_limit > 20);
         assert_true(limits[l] == 1.0 || guesses_beyond > 5);
@@ -238,30 +216,21 @@ TEST(no_value_moves_by_more_than_the_limit_or_out_of_its_range) {
 }
 
 /* Two pairs of squares, which are two islands. */
-TEST(without_coverage_charts_tell_what_is_a_guess) {
+TEST(without_coverage_texels_outside_of_charts_are_guesses) {
     FREED charts_mesh *m = new_mesh();
     for (int i = 0; i < 4; ++i) { /* the charts of a pair lie far from each other, in other orders */
         const double places[4][2] = {{3.4, 50.6}, {36.2, 22.3}, {40.7, 55.9}, {5.1, 20.8}};
         add_square(m, 5.0 * (i / 2) + i % 2, places[i], 11.0 + i, 0.0, 1.0);
     }
-    vsh_lightmap_options options = vsh_lightmap_options_default();
-    options.width = options.height = SIDE;
-    OWNED(vsh_charts) *charts = NULL;
-    assert_ok(vsh_charts_create(&m->mesh, 1, &options, NULL, NULL, &charts, &failure));
-    OWNED(vsh_texels) *texels = NULL;
-    assert_ok(vsh_texels_create(charts, NULL, &texels, &failure));
-    const vsh_texel_samples samples = vsh_texels_samples(texels);
-    FREED float *plane = new_plane(0.0f), *before = new_plane(0.0f), *covered = new_plane(0.0f);
+    OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
+    OWNED(vshi_texels) *texels = NULL;
+    assert_ok(vshi_texels_create(charts, NULL, &texels, &failure));
+    const vshi_texel_samples samples = vshi_texels_samples(texels);
+    FREED float *plane = random_plane(5), *before = random_plane(5), *covered = new_plane(0.0f);
     for (size_t i = 0; i < samples.count; ++i) {
         covered[vsh_texel_place(samples.texels[i], SIDE)] = 1.0f;
     }
-    uint32_t seed = 5;
-    for (size_t i = 0; i < TEXELS; ++i) {
-        plane[i] = before[i] = random_value(&seed);
-    }
-    const vsh_lightmap map = {.ao = plane};
-    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
-    assert_int_equal(report.seams, 2);
+    assert_int_equal(stitch_ao(m, plane, E).seams, 2);
     size_t moved = 0, beyond = 0;
     for (size_t i = 0; i < TEXELS; ++i) {
         const double by = fabs((double)plane[i] - (double)before[i]);
@@ -288,19 +257,15 @@ TEST(creases_are_left_and_smooth_normals_make_none) {
         bool smooth, stitched;
     } cases[] = {{0.0, false, true},  {4.9, false, true},    {-4.9, false, true},
                  {5.1, false, false}, {-90.0, false, false}, {90.0, true, true}};
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         FREED charts_mesh *m = bent_squares(cases[i].degrees);
         for (size_t v = 0; cases[i].smooth && v < 8; ++v) {
             const float up[3] = {v == 1 || v == 2 || v == 4 || v == 7 ? -1.0f : 0.0f, 0.0f, 1.0f};
             memcpy(m->normals + 3 * v, up, sizeof up);
             m->mesh.normals = m->normals;
         }
-        FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
-        fill_squares(plane);
-        fill_squares(before);
-        const vsh_lightmap map = {.ao = plane};
-        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
-        assert_int_equal(report.seams, cases[i].stitched);
+        FREED float *plane = plane_of_squares(), *before = plane_of_squares();
+        assert_int_equal(stitch_ao(m, plane, E).seams, cases[i].stitched);
         assert_true((memcmp(plane, before, TEXELS * sizeof *plane) != 0) == cases[i].stitched);
     }
 }
@@ -331,7 +296,7 @@ TEST(meshes_meet_in_the_world) {
 }
 
 /* A third chart lies 0.1 texels beside the border, along half of its length. */
-TEST(a_chart_nearby_is_neither_read_nor_moved) {
+TEST(a_chart_nearby_is_not_read_and_not_moved) {
     FREED charts_mesh *m = two_squares(0.0, 1.0);
     add_quad(m, (const double[][3]){{7, 0, 0}, {8, 0, 0}, {8, 1, 0}, {7, 1, 0}},
              (const double[][2]){{22.4, 16.6}, {29.9, 16.6}, {29.9, 3.1}, {22.4, 3.1}});
@@ -341,8 +306,7 @@ TEST(a_chart_nearby_is_neither_read_nor_moved) {
         plane[i] = x >= 22 && x < 30 && y < 17 ? 0.9f : is_first(i) ? 0.5f : 0.52f;
     }
     memcpy(before, plane, TEXELS * sizeof *plane);
-    const vsh_lightmap map = {.ao = plane};
-    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+    const vsh_stitch_report report = stitch_ao(m, plane, E);
     assert_true(report.crowded > 10 && report.places > 10);
     assert_true(report.after < 0.02 * report.before);
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -362,22 +326,19 @@ TEST(degenerate_edges_change_nothing) {
         {{{1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}}, {{-13, 60}, {-2, 60}, {-2, 50}, {-13, 50}}},
         {{{1, 0, 0}, {2, 0, 0}, {2, 1, 0}, {1, 1, 0}}, {{-2e9, 60}, {9, 6e12}, {9, 55}, {2, -55}}}};
     FREED charts_mesh *m = two_squares(90.0, 1.0);
-    static float plane[2][TEXELS];
+    FREED float *plane = plane_of_squares(), *more = plane_of_squares();
     for (size_t round = 0; round < 2; ++round) {
-        fill_squares(plane[round]);
-        const vsh_lightmap map = {.ao = plane[round]};
-        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+        const vsh_stitch_report report = stitch_ao(m, round == 0 ? plane : more, E);
         assert_int_equal(report.seams, 1);
-        for (size_t k = 0; k < sizeof degenerate / sizeof degenerate[0]; ++k) {
+        for (size_t k = 0; k < COUNT_OF(degenerate); ++k) {
             add_quad(m, degenerate[k].corner, degenerate[k].texel);
         }
     }
-    assert_memory_equal(plane[0], plane[1], sizeof plane[0]);
+    assert_memory_equal(plane, more, TEXELS * sizeof *plane);
     for (int again = 0; again < 60; ++again) { /* an edge of 120 triangles, in as many charts */
         add_square(m, 1.0, (const double[]){SECOND[0] + 0.01 * again, SECOND[1]}, 14.0, 90.0, 1.0);
     }
-    const vsh_lightmap map = {.ao = plane[0]};
-    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+    const vsh_stitch_report report = stitch_ao(m, plane, E);
     assert_true(report.seams > 60 && report.seams < 4000);
 }
 
@@ -402,7 +363,7 @@ static const double TURNED[12] = {0.36, 0.48, -0.8, 70.7, -0.8, 0.6, 0.0, 11.1, 
 
 /* (a, b) go to the minimum of 2 (d + a - b)² + keep (a² + b²), as along a border of equal edges. */
 TEST(parts_of_edges_meet_as_whole_ones_do) {
-    for (size_t i = 0; i < 3 * sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < 3 * COUNT_OF(cases); ++i) {
         const size_t c = i / 3;
         FREED charts_mesh *m = new_mesh();
         add_strip(m, 0, cases[c].left, cases[c].left_count, 10.5);
@@ -416,9 +377,8 @@ TEST(parts_of_edges_meet_as_whole_ones_do) {
                                row[2] * (double)from[2] + row[3]);
             }
         }
-        FREED float *plane = plane_of_columns();
-        const vsh_lightmap map = {.ao = plane};
-        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
+        FREED float *plane = plane_of_columns(15, 0.5f, 0.53f);
+        const vsh_stitch_report report = stitch_ao(m, plane, E);
         assert_that(report.seams == cases[c].seams, "case %zu: %d seams, expected %d", i, (int)report.seams,
                     (int)cases[c].seams);
         const double move = 2.0 * 0.03 / (4.0 + 0.01);
@@ -444,9 +404,7 @@ TEST(an_end_beside_an_edge_or_over_a_crease_cuts_nothing) {
             p[2] += kind == 2 ? 0.2F * (p[0] - 1.0F) : 0.0F; /* 11 degrees */
         }
         FREED float *plane = new_plane(0.5f);
-        const vsh_lightmap map = {.ao = plane};
-        const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
-        assert_int_equal(report.seams, kind == 0 ? 2 : 0);
+        assert_int_equal(stitch_ao(m, plane, E).seams, kind == 0 ? 2 : 0);
     }
 }
 
@@ -455,14 +413,8 @@ TEST(a_junction_within_a_chart_is_no_seam) {
     FREED charts_mesh *m = new_mesh();
     add_strip(m, 0, WHOLE, 2, 15.5);
     add_strip(m, 1, HALVES, 3, 15.5);
-    FREED float *plane = new_plane(0.5f), *before = new_plane(0.5f);
-    uint32_t seed = 3;
-    for (size_t t = 0; t < TEXELS; ++t) {
-        plane[t] = before[t] = random_value(&seed);
-    }
-    const vsh_lightmap map = {.ao = plane};
-    const vsh_stitch_report report = stitch(&m->mesh, 1, &map, 0, E);
-    assert_int_equal(report.seams, 0);
+    FREED float *plane = random_plane(3), *before = random_plane(3);
+    assert_int_equal(stitch_ao(m, plane, E).seams, 0);
     assert_memory_equal(plane, before, TEXELS * sizeof *plane);
 }
 
@@ -505,7 +457,7 @@ TEST(borders_between_lightmaps_agree) {
         FREED_BY(free_pages) two_pages p;
         make_pages(&p, cut ? THIRDS : WHOLE, cut ? 4 : 2);
         vsh_stitch_report report;
-        assert_ok(vsh_lightmap_stitch(p.charts[0], &p.maps[0], 0, NULL, NULL, &report, &failure));
+        assert_ok(stitch_one(p.charts[0], &p.maps[0], 0, NULL, NULL, &report, &failure));
         assert_int_equal(report.seams, 0);
         assert_ok(vsh_lightmaps_stitch(p.pages, 2, 0, NULL, NULL, &report, &failure));
         assert_int_equal(report.seams, cut ? 3 : 1);
@@ -529,16 +481,12 @@ TEST(one_of_several_changes_as_it_does_alone) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     m->mesh.transform = away;
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
-    FREED float *alone = new_plane(0.5f), *among = new_plane(0.5f);
+    FREED float *alone = random_plane(9), *among = random_plane(9);
     FREED_BY(free_pages) two_pages p;
     make_pages(&p, WHOLE, 2);
-    uint32_t seed = 9;
-    for (size_t i = 0; i < TEXELS; ++i) {
-        alone[i] = among[i] = random_value(&seed);
-    }
     const vsh_lightmap of_one = {.ao = alone}, of_three = {.ao = among};
     const vsh_stitch_page pages[3] = {p.pages[0], {charts, &of_three}, p.pages[1]};
-    assert_ok(vsh_lightmap_stitch(charts, &of_one, 0, NULL, NULL, NULL, &failure));
+    assert_ok(stitch_one(charts, &of_one, 0, NULL, NULL, NULL, &failure));
     assert_ok(vsh_lightmaps_stitch(pages, 3, 0, NULL, NULL, NULL, &failure));
     assert_memory_equal(alone, among, TEXELS * sizeof *alone);
 }
@@ -570,7 +518,7 @@ static vsh_result stitch_noise(const charts_mesh *m, const vsh_run *run, float *
     }
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
     const vsh_lightmap map = {.ao = ao, .irradiance = light};
-    return vsh_lightmap_stitch(charts, &map, 0, NULL, run, NULL, error);
+    return stitch_one(charts, &map, 0, NULL, run, NULL, error);
 }
 
 TEST(the_memory_limit_is_held_before_anything_moves) {
@@ -610,23 +558,8 @@ TEST(the_memory_limit_is_held_before_anything_moves) {
     assert_int_equal(stitch_noise(m, &run, before, other, &failure), VSH_ERROR_LIMIT);
 }
 
-typedef struct stopping {
-    double at;
-    double last;
-    int calls;
-} stopping;
-
-static int stop_at(void *user, const char *stage, double fraction) {
-    stopping *s = user;
-    assert_string_equal(stage, "seams");
-    assert_true(fraction >= s->last && fraction <= 1.0);
-    s->last = fraction;
-    ++s->calls;
-    return fraction >= s->at;
-}
-
 /* The same differences, as AO and as light. */
-TEST(differences_of_light_are_told_in_parts_of_the_brightest) {
+TEST(differences_of_light_are_relative_to_the_brightest_texel) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
     for (size_t i = 0; i < TEXELS; ++i) {
@@ -641,20 +574,6 @@ TEST(differences_of_light_are_told_in_parts_of_the_brightest) {
     assert_true(of_light.places == of_ao.places && of_light.texels == of_ao.texels);
 }
 
-TEST(it_is_cancelled_wherever_it_is_and_tells_how_far_it_is) {
-    FREED charts_mesh *m = two_squares(37.0, 1.0);
-    FREED float *ao = new_plane(0.0f), *light = malloc(3 * TEXELS * sizeof *light);
-    const double at[] = {0.0, 0.2, 0.5, 2.0};
-    for (size_t i = 0; i < sizeof at / sizeof at[0]; ++i) {
-        stopping s = {at[i], 0.0, 0};
-        vsh_run run = run_watched(stop_at, &s);
-        run.threads = 1;
-        const vsh_result result = stitch_noise(m, &run, ao, light, &failure);
-        assert_int_equal(result, at[i] > 1.0 ? VSH_OK : VSH_ERROR_CANCELLED);
-        assert_true(s.calls > 0 && (at[i] < 1.0 || s.last == 1.0));
-    }
-}
-
 TEST(options_out_of_range_are_refused) {
     FREED charts_mesh *m = two_squares(0.0, 1.0);
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
@@ -666,12 +585,12 @@ TEST(options_out_of_range_are_refused) {
                                    &options.max_change};
         const double values[] = {-1e-9, -1.0, 0.0, 1.001, NAN, 181.0, 1.5, INFINITY};
         *members[i % 4] = values[i];
-        assert_fails(vsh_lightmap_stitch(charts, &map, 0, &options, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
+        assert_fails(stitch_one(charts, &map, 0, &options, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
                      "vsh_stitch_options.");
     }
 }
 
-TEST(what_is_no_value_of_light_is_left) {
+TEST(planes_that_are_not_light_do_not_change) {
     FREED charts_mesh *m = two_squares(37.0, 1.0);
     FREED float *ao = new_plane(0.5f), *bent = malloc(3 * TEXELS * sizeof *bent), *error = new_plane(0.0f);
     FREED float *invalid = new_plane(0.0f), *coverage = new_plane(1.0f), *shadow = new_plane(0.0f),
@@ -712,4 +631,110 @@ TEST(what_is_no_value_of_light_is_left) {
         }
     }
     assert_true(moved > 20);
+}
+
+/* --- least squares within limits: the conditions of a minimum (Karush, Kuhn and Tucker) */
+
+enum { UNKNOWNS = 600, ROWS = 900, FIRST = 1000 };
+
+typedef struct system {
+    vshi_seam_row rows[ROWS];
+    double values[UNKNOWNS], low[UNKNOWNS], high[UNKNOWNS], keep[UNKNOWNS], gradient[UNKNOWNS],
+        change[UNKNOWNS];
+    double work[VSHI_SEAM_WORK * UNKNOWNS];
+    vshi_seam_problem problem;
+} system_of_rows;
+
+/* Rows between texels near each other, as along a border; `limit` of each change. */
+static system_of_rows *new_system(uint32_t seed, double limit, double keep, vshi_job *job) {
+    system_of_rows *s = calloc(1, sizeof *s);
+    for (size_t r = 0; r < ROWS; ++r) {
+        const size_t at = r * (UNKNOWNS / 2 - 4) / ROWS;
+        float left = 1.0f;
+        for (size_t k = 0; k < VSHI_SEAM_READS; ++k) {
+            const float weight = k % 4 == 3 ? left : 0.25f * (float)(int)(3.0f * random_value(&seed)) * left;
+            left = k % 4 == 3 ? 1.0f : left - weight;
+            s->rows[r].unknown[k] = (uint32_t)(FIRST + at + k % 4 + (k < 4 ? 0 : UNKNOWNS / 2));
+            s->rows[r].weight[k] = k < 4 ? weight : -weight;
+        }
+        s->rows[r].share = 0.25f + random_value(&seed);
+    }
+    for (size_t u = 0; u < UNKNOWNS; ++u) {
+        s->values[u] = (double)random_value(&seed);
+        s->low[u] = u % 7 == 0 ? 0.0 : -limit;
+        s->high[u] = u % 11 == 0 ? 0.0 : limit;
+        s->keep[u] = keep * (u % 5 == 0 ? 0.1 : 1.0);
+    }
+    s->problem = (vshi_seam_problem){.rows = s->rows,
+                                     .row_count = ROWS,
+                                     .unknown_count = UNKNOWNS,
+                                     .first = FIRST,
+                                     .low = s->low,
+                                     .high = s->high,
+                                     .keep = s->keep,
+                                     .gradient = s->gradient,
+                                     .change = s->change,
+                                     .work = s->work,
+                                     .job = job};
+    vshi_seam_gradient(&s->problem, s->values, s->gradient);
+    return s;
+}
+
+/* The gradient where the changes are, by the definition. */
+static void gradient_at(const system_of_rows *s, double *gradient) {
+    for (size_t u = 0; u < UNKNOWNS; ++u) {
+        gradient[u] = s->keep[u] * s->change[u];
+    }
+    for (size_t r = 0; r < ROWS; ++r) {
+        double difference = 0.0;
+        for (size_t k = 0; k < VSHI_SEAM_READS; ++k) {
+            const size_t u = s->rows[r].unknown[k] - FIRST;
+            difference += (double)s->rows[r].weight[k] * (s->values[u] + s->change[u]);
+        }
+        for (size_t k = 0; k < VSHI_SEAM_READS; ++k) {
+            gradient[s->rows[r].unknown[k] - FIRST] +=
+                (double)s->rows[r].share * (double)s->rows[r].weight[k] * difference;
+        }
+    }
+}
+
+TEST(the_solution_is_the_minimum_within_the_limits) {
+    const double limits[] = {0.0, 0.01, 0.1, 0.4, 10.0};
+    vshi_job *job = vshi_job_begin(NULL, "seams", 1);
+    for (size_t l = 0; l < COUNT_OF(limits); ++l) {
+        for (uint32_t seed = 0; seed < 20; ++seed) {
+            FREED system_of_rows *s = new_system(seed, limits[l], 0.01, job);
+            const int steps = vshi_seam_solve(&s->problem);
+            double gradient[UNKNOWNS], first = 0.0, left = 0.0;
+            gradient_at(s, gradient);
+            size_t held = 0;
+            for (size_t u = 0; u < UNKNOWNS; ++u) {
+                assert_true(s->change[u] >= s->low[u] && s->change[u] <= s->high[u]);
+                const double down = s->change[u] > s->low[u] ? fmax(gradient[u], 0.0) : 0.0;
+                const double up = s->change[u] < s->high[u] ? fmin(gradient[u], 0.0) : 0.0;
+                held += down == 0.0 && up == 0.0 && gradient[u] != 0.0;
+                left += down * down + up * up;
+                first += s->gradient[u] * s->gradient[u];
+            }
+            assert_true(sqrt(left) <= 1.01e-4 * sqrt(first));
+            assert_true(limits[l] == 0.0 || limits[l] > 0.2 || held > UNKNOWNS / 4);
+            assert_true(limits[l] > 0.0 || steps == 0);
+        }
+    }
+    vshi_job_end(job);
+}
+
+/* Plain gradient steps take thousands. */
+TEST(a_stiff_system_takes_some_hundred_steps) {
+    vshi_job *job = vshi_job_begin(NULL, "seams", 1);
+    for (uint32_t seed = 0; seed < 8; ++seed) {
+        FREED system_of_rows *s = new_system(seed, 1e6, 1e-3, job);
+        for (size_t u = 0; u < UNKNOWNS; ++u) {
+            s->low[u] = -1e6;
+            s->high[u] = 1e6;
+        }
+        const int steps = vshi_seam_solve(&s->problem);
+        assert_in_range(steps, 5, 700);
+    }
+    vshi_job_end(job);
 }

@@ -46,7 +46,7 @@ TEST(a_resolution_and_a_voxel_size_take_each_others_place) {
     assert_true(scene.grid.resolution == 64 && scene.grid.voxel_size == 0.0);
 }
 
-TEST(what_is_refused_is_told_and_changes_nothing) {
+TEST(refused_settings_change_nothing) {
     static const struct {
         const char *name, *text, *says;
         vsh_result result;
@@ -71,7 +71,7 @@ TEST(what_is_refused_is_told_and_changes_nothing) {
         {"--padding", "4", "--padding: no such setting of a scene", VSH_ERROR_ARGUMENT},
         {"", "4", "no such setting", VSH_ERROR_ARGUMENT},
     };
-    for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         const vsh_scene before = vsh_scene_default();
         vsh_scene scene = before;
         const vsh_result result = vsh_scene_set(&scene, cases[i].name, cases[i].text, &failure);
@@ -90,7 +90,7 @@ TEST(settings_of_a_flat_scene_are_its_own) {
     static const char *const given[][2] = {
         {"--size", "64x32"}, {"method", "classic"}, {"supersample", "3"},      {"--padding", "7"},
         {"max_steps", "99"}, {"--bits", "16"},      {"--color-space", "srgb"}, {"pack", "R=shadow.a"}};
-    for (size_t i = 0; i < sizeof given / sizeof given[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(given); ++i) {
         assert_ok(vsh_flat_scene_set(&flat, given[i][0], given[i][1], &failure));
     }
     const vsh_flat_options *o = &flat.options;

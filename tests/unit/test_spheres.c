@@ -13,21 +13,20 @@ typedef struct stage {
     truth_solid solids[MOST];
     double spheres[MOST][4];
     size_t count;
-    vsh_spheres *made;
+    vshi_spheres *made;
     double positions[3 * POINTS];
     float normals[3 * POINTS];
 } stage;
 
-static vsh_spheres *spheres_of(const double *list, size_t count, const double *transform) {
-    vsh_spheres *made = NULL;
-    assert_ok(vsh_spheres_create(list, count, transform, NULL, &made, &failure));
+static vshi_spheres *spheres_of(const double *list, size_t count, const double *transform) {
+    vshi_spheres *made = NULL;
+    assert_ok(vshi_spheres_create(list, count, transform, NULL, &made, &failure));
     return made;
 }
 
 /* `count` spheres of radii low … high in a box over a floor, which the points are on. */
 static stage *set_up(size_t count, double low, double high, double side) {
     stage *s = calloc(1, sizeof *s);
-    assert_non_null(s);
     uint64_t counter = count;
     s->count = count;
     for (size_t i = 0; i < count; ++i) {
@@ -50,7 +49,7 @@ static stage *set_up(size_t count, double low, double high, double side) {
 }
 
 static void tear_down(stage *s) {
-    vsh_spheres_free(s->made);
+    vshi_spheres_free(s->made);
     free(s);
 }
 
@@ -61,7 +60,7 @@ static void shadow(const stage *s, const vsh_light *light, int32_t method, bool 
     assert_true(stats.samples > 0);
 }
 
-static float shadow_at_point(const vsh_spheres *made, const vsh_light *light, int32_t method,
+static float shadow_at_point(const vshi_spheres *made, const vsh_light *light, int32_t method,
                              const double *position, const float *normal) {
     const vsh_points points = {1, position, normal, NULL};
     vsh_shade_stats stats = vsh_shade_stats_zero();
@@ -91,19 +90,16 @@ TEST(hard_shadows_are_the_rays) {
 TEST(the_classic_method_is_the_nearest_miss) {
     stage *s = set_up(30, 0.05, 0.3, 2.0);
     static float values[POINTS];
-    const double w = 0.1, length = sqrt(0.97);
+    const double w = 0.1;
     const vsh_light light = sun(TOWARDS, 2.0 * atan(w));
     shadow(s, &light, VSH_SHADOW_CLASSIC, false, values);
     for (size_t i = 0; i < POINTS; ++i) {
         double expected = 1.0;
         for (size_t k = 0; k < s->count; ++k) {
-            double along = 0.0, square = 0.0;
-            for (size_t axis = 0; axis < 3; ++axis) {
-                const double d = s->spheres[k][axis] - s->positions[3 * i + axis];
-                along += d * TOWARDS[axis] / length;
-                square += d * d;
-            }
-            const double miss = sqrt(square - along * along) - s->spheres[k][3];
+            double d[3];
+            go_along(s->spheres[k], -1.0, s->positions + 3 * i, d);
+            const double along = dot3(d, TOWARDS) / length3(TOWARDS);
+            const double miss = sqrt(dot3(d, d) - along * along) - s->spheres[k][3];
             if (along > 0.0) {
                 expected = fmin(expected, fmax(miss, 0.0) / (w * along));
             }
@@ -116,7 +112,7 @@ TEST(the_classic_method_is_the_nearest_miss) {
 /* Half of a sphere is below its own tangent plane, and does not shade it. */
 TEST(a_sphere_leaves_its_own_surface_open) {
     const double sphere[4] = {1.0, 2.0, 3.0, 0.7};
-    OWNED(vsh_spheres) *made = spheres_of(sphere, 1, NULL);
+    OWNED(vshi_spheres) *made = spheres_of(sphere, 1, NULL);
     uint64_t counter = 4;
     for (int i = 0; i < 200; ++i) {
         double n[3], towards[3], position[3];
@@ -135,7 +131,6 @@ TEST(a_sphere_leaves_its_own_surface_open) {
 TEST(bounds_lose_no_sphere_of_many) {
     enum { MANY = 20000 };
     FREED double *list = malloc(4 * MANY * sizeof *list);
-    assert_non_null(list);
     uint64_t counter = 8;
     for (size_t i = 0; i < MANY; ++i) {
         for (size_t k = 0; k < 3; ++k) {
@@ -145,9 +140,9 @@ TEST(bounds_lose_no_sphere_of_many) {
         list[4 * i + 3] = between(&counter, 0.01, 0.3);
     }
     static const double moved[12] = {0, -2, 0, 7, 0, 0, 2, -3, -2, 0, 0, 1};
-    OWNED(vsh_spheres) *made = spheres_of(list, MANY, moved);
-    vsh_spheres_info info;
-    vsh_spheres_get_info(made, &info);
+    OWNED(vshi_spheres) *made = spheres_of(list, MANY, moved);
+    vshi_spheres_info info;
+    vshi_spheres_get_info(made, &info);
     assert_int_equal(info.count, MANY);
     assert_true(info.bytes <= 100 * MANY);
     for (int p = 0; p < 200; ++p) {
@@ -161,8 +156,7 @@ TEST(bounds_lose_no_sphere_of_many) {
             const double *s = list + 4 * i;
             const double d[3] = {-2.0 * s[1] + 7 - position[0], 2.0 * s[2] - 3 - position[1],
                                  -2.0 * s[0] + 1 - position[2]};
-            const double along = d[0] * towards[0] + d[1] * towards[1] + d[2] * towards[2];
-            const double square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+            const double along = dot3(d, towards), square = dot3(d, d);
             hidden = hidden || square < 4.0 * s[3] * s[3] ||
                      (along > 0.0 && square - along * along < 4.0 * s[3] * s[3]);
         }
@@ -174,7 +168,7 @@ TEST(bounds_lose_no_sphere_of_many) {
 
 TEST(points_that_are_no_points_are_nan_and_inner_ones_dark) {
     const double sphere[4] = {0, 0, 0, 1};
-    OWNED(vsh_spheres) *made = spheres_of(sphere, 1, NULL);
+    OWNED(vshi_spheres) *made = spheres_of(sphere, 1, NULL);
     const double positions[12] = {NAN, 0, 0, 0, 5, 0, 0, 0.3, 0, 0, 5, 0};
     const float normals[12] = {0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0};
     static const double up[3] = {0, 1, 0};
@@ -194,23 +188,24 @@ TEST(bad_spheres_are_refused_by_number) {
     static const double shear[12] = {1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0},
                         bad[] = {0.0, -1.0, INFINITY, NAN, 1e16};
     double list[8] = {0, 0, 0, 1, 1, 1, 1, 1};
-    vsh_spheres *made = NULL;
+    vshi_spheres *made = NULL;
     for (size_t i = 0; i < 5; ++i) {
         list[7] = bad[i];
-        assert_fails(vsh_spheres_create(list, 2, NULL, NULL, &made, &failure), VSH_ERROR_INPUT,
+        assert_fails(vshi_spheres_create(list, 2, NULL, NULL, &made, &failure), VSH_ERROR_INPUT,
                      "sphere 1: radius");
         assert_null(made);
     }
     list[7] = 1.0;
     list[1] = NAN;
-    assert_fails(vsh_spheres_create(list, 2, NULL, NULL, &made, &failure), VSH_ERROR_INPUT,
+    assert_fails(vshi_spheres_create(list, 2, NULL, NULL, &made, &failure), VSH_ERROR_INPUT,
                  "sphere 0: y nan");
     list[1] = 0.0;
     const vsh_run run = run_within(150);
-    assert_fails(vsh_spheres_create(list, 2, shear, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
-    assert_fails(vsh_spheres_create(list, 0, NULL, NULL, &made, &failure), VSH_ERROR_INPUT, "");
-    assert_fails(vsh_spheres_create(list, (size_t)1 << 31, NULL, NULL, &made, &failure), VSH_ERROR_LIMIT, "");
-    assert_fails(vsh_spheres_create(list, 2, NULL, &run, &made, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vshi_spheres_create(list, 2, shear, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
+    assert_fails(vshi_spheres_create(list, 0, NULL, NULL, &made, &failure), VSH_ERROR_INPUT, "");
+    assert_fails(vshi_spheres_create(list, (size_t)1 << 31, NULL, NULL, &made, &failure), VSH_ERROR_LIMIT,
+                 "");
+    assert_fails(vshi_spheres_create(list, 2, NULL, &run, &made, &failure), VSH_ERROR_LIMIT, "");
 }
 
 static vsh_result read_text(const char *text, double **spheres, size_t *count, vsh_error *error) {
@@ -219,7 +214,7 @@ static vsh_result read_text(const char *text, double **spheres, size_t *count, v
     assert_true(file >= 0);
     assert_true(write(file, text, strlen(text)) == (ssize_t)strlen(text));
     close(file);
-    const vsh_result result = vsh_spheres_read(path, NULL, spheres, count, error);
+    const vsh_result result = vshi_spheres_read(path, NULL, spheres, count, error);
     unlink(path);
     return result;
 }
@@ -234,7 +229,7 @@ TEST(rows_of_a_file_are_read_or_refused_by_number) {
         VSH_OK);
     assert_int_equal(count, 4);
     assert_memory_equal(spheres, expected, sizeof expected);
-    vsh_spheres_list_free(spheres);
+    vshi_spheres_list_free(spheres);
     static const struct {
         const char *text, *message;
     } bad[] = {
@@ -250,12 +245,12 @@ TEST(rows_of_a_file_are_read_or_refused_by_number) {
         {"# nothing\n", ": no spheres"},
         {"", ": no spheres"},
     };
-    for (size_t i = 0; i < sizeof bad / sizeof bad[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
         assert_int_equal(read_text(bad[i].text, &spheres, &count, &failure), VSH_ERROR_INPUT);
         assert_that(strstr(failure.message, bad[i].message) != NULL, "%s: %s", bad[i].message,
                     failure.message);
         assert_null(spheres);
     }
-    assert_int_equal(vsh_spheres_read("no such file.csv", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
-    assert_int_equal(vsh_spheres_read(".", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
+    assert_int_equal(vshi_spheres_read("no such file.csv", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
+    assert_int_equal(vshi_spheres_read(".", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
 }

@@ -2,7 +2,7 @@
 #include "shading.h"
 #include "testing.h"
 
-#include "field/surface.h"
+#include "field/field.h"
 #include "trace/embree.h"
 
 #define VOXEL 0.04
@@ -32,7 +32,6 @@ static int compare_edges(const void *a, const void *b) {
 /* Gives corners at one place one number: bricks have their own. */
 static uint32_t *welded(const quads *q) {
     uint32_t *order = calloc(q->corner_count, sizeof *order), *same = calloc(q->corner_count, sizeof *same);
-    assert_true(order != NULL && same != NULL);
     for (size_t i = 0; i < q->corner_count; ++i) {
         order[i] = (uint32_t)i;
     }
@@ -48,7 +47,6 @@ static uint32_t *welded(const quads *q) {
 
 static size_t count_open_edges(const quads *q) {
     uint32_t *same = welded(q), (*edges)[2] = calloc(4 * q->quad_count, sizeof *edges);
-    assert_non_null(edges);
     size_t count = 0;
     for (size_t i = 0; i < q->quad_count; ++i) {
         for (size_t k = 0; k < 4; ++k) {
@@ -93,7 +91,7 @@ TEST(surface_is_closed) {
     const double heights[] = {0.0, GROWN, -1.0};
     OWNED(vsh_field) *seeds = field_of(truth_seeds(), VOXEL, 1.0);
     OWNED(vsh_field) *hollow = hollow_box(VOXEL, 1.1 * VOXEL), *stones = rubble();
-    for (size_t i = 0; i < sizeof heights / sizeof heights[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(heights); ++i) {
         FREED_BY(vshi_surface_quads_free) quads q = quads_of(seeds, heights[i]);
         assert_int_equal(count_open_edges(&q), 0);
         vshi_surface_quads_free(&q);
@@ -165,29 +163,29 @@ static void hold_rays(const vsh_field *field, size_t tries, double reach, double
 static vsh_field *with_surface(vsh_field *field) {
     const vsh_run run = vsh_run_default();
     vshi_job *job = vshi_job_begin(&run, "surface", 1);
-    assert_ok(vshi_field_add_surface(field, (vshi_budget){&run, 0.0}, job, &failure));
+    assert_ok(vshi_field_add_surface(field, (vshi_field_budget){&run, 0.0}, job, &failure));
     vshi_job_end(job);
     return field;
 }
 
-TEST(rays_meet_what_the_cells_read) {
+TEST(rays_meet_the_surface_of_the_cells) {
     const struct {
         vsh_field *field;
         double chord;
     } held[] = {{field_of(truth_seeds(), VOXEL, 1.0), 0.05},
                 {hollow_box(VOXEL, 1.1 * VOXEL), 0.05}, /* no ray leaks from the room, or into it */
                 {rubble(), 0.25}};
-    for (size_t i = 0; i < sizeof held / sizeof held[0]; ++i) {
+    for (size_t i = 0; i < COUNT_OF(held); ++i) {
         hold_rays(with_surface(held[i].field), 40000, 20.0, held[i].chord);
-        vsh_field_free(held[i].field);
+        vshi_field_free(held[i].field);
     }
 }
 
 static vsh_result make(const vsh_grid *grid, const vsh_run *run, vsh_field **field, vsh_error *error) {
-    vsh_field_options options = vsh_field_options_default();
+    vshi_field_options options = vshi_field_options_default();
     options.reach = 1.0;
     options.surface = 1;
-    return vsh_field_create(grid, &options, run, field, error);
+    return vshi_field_create(grid, &options, run, field, error);
 }
 
 /* Shadow and AO of the floor by adaptive. */
@@ -195,7 +193,6 @@ static void shade_floor(const vsh_field *field, int32_t threads, size_t size, fl
     const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     FREED double *positions = calloc(3 * size * size, sizeof *positions);
     FREED float *normals = calloc(3 * size * size, sizeof *normals);
-    assert_true(positions != NULL && normals != NULL);
     floor_texels(size, positions, normals);
     const vsh_points points = {size * size, positions, normals, NULL};
     vsh_shade_options options = vsh_shade_options_default();
@@ -265,7 +262,6 @@ TEST(surface_keeps_the_limit_and_ends_when_asked) {
     vsh_field_get_info(plain, &info);
     vsh_grid_get_info(grid, &voxels);
     run.memory_limit = 2 * (info.bytes + voxels.bytes);
-    assert_int_equal(make(grid, &run, &field, &failure), VSH_ERROR_LIMIT);
-    assert_non_null(strstr(failure.message, "surface"));
+    assert_fails(make(grid, &run, &field, &failure), VSH_ERROR_LIMIT, "surface");
     assert_null(field);
 }

@@ -1,6 +1,131 @@
-/* Which texels of a lightmap are valid, by rays against triangles: boxes and spheres, where it is known. */
+/* Which texels of a lightmap are valid, by rays against triangles: boxes and spheres, where it is known. And
+ * lightmaps as a viewer sees them: bilinear lookups on the surface, which read borders and padding too. */
+#include "casts.h"
+#include "directions.h"
+#include "embree.h"
 #include "testing.h"
-#include "validity.h"
+
+OWNER(truth_mesh)
+
+static const double PI = 3.14159265358979323846;
+
+enum { MOST_QUADS = 4096, MOST_BOXES = 64, SIZE = 256 };
+
+typedef struct box {
+    double low[3], high[3];
+} box;
+
+/* Quads in one mesh, each with a square of its own in a grid of charts. */
+typedef struct shape {
+    float positions[12 * MOST_QUADS], uvs[8 * MOST_QUADS];
+    uint32_t indices[6 * MOST_QUADS];
+    size_t quads;
+    box boxes[MOST_BOXES]; /* the solids among them */
+    size_t box_count;
+} shape;
+
+static void add_quad(shape *s, const double corners[4][3]) {
+    assert_true(s->quads < MOST_QUADS);
+    for (size_t k = 0; k < 4; ++k) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            s->positions[12 * s->quads + 3 * k + axis] = (float)corners[k][axis];
+        }
+    }
+    for (size_t k = 0; k < 6; ++k) {
+        s->indices[6 * s->quads + k] = (uint32_t)(4 * s->quads) + QUAD_INDICES[k];
+    }
+    ++s->quads;
+}
+
+/* `inwards` turns its faces: a room. */
+static void add_faces(shape *s, box b, bool inwards) {
+    for (int axis = 0; axis < 3; ++axis) {
+        for (int side = 0; side < 2; ++side) {
+            const int u = (axis + 1) % 3, v = (axis + 2) % 3;
+            double corners[4][3];
+            for (int k = 0; k < 4; ++k) {
+                const bool along = k == 1 || k == 2, across = k >= 2;
+                const bool turned = (side == 0) != inwards;
+                corners[k][axis] = side != 0 ? b.high[axis] : b.low[axis];
+                corners[k][u] = (turned ? across : along) ? b.high[u] : b.low[u];
+                corners[k][v] = (turned ? along : across) ? b.high[v] : b.low[v];
+            }
+            add_quad(s, (const double(*)[3])corners);
+        }
+    }
+}
+
+static void add_box(shape *s, box b) {
+    assert_true(s->box_count < MOST_BOXES);
+    s->boxes[s->box_count++] = b;
+    add_faces(s, b, false);
+}
+
+/* A strip of charts has gaps of a fifth. */
+static vsh_mesh mesh_of(shape *s) {
+    const size_t across = (size_t)ceil(sqrt((double)s->quads));
+    for (size_t q = 0; q < s->quads; ++q) {
+        static const float corner[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+        for (size_t k = 0; k < 4; ++k) {
+            s->uvs[8 * q + 2 * k] = ((float)(q % across) + 0.1f + 0.8f * corner[k][0]) / (float)across;
+            s->uvs[8 * q + 2 * k + 1] = ((float)(q / across) + 0.1f + 0.8f * corner[k][1]) / (float)across;
+        }
+    }
+    return (vsh_mesh){.name = "shape",
+                      .positions = s->positions,
+                      .uvs = s->uvs,
+                      .indices = s->indices,
+                      .vertex_count = 4 * s->quads,
+                      .triangle_count = 2 * s->quads};
+}
+
+/* A lightmap of AO, and what is behind it. */
+typedef struct baked {
+    vsh_charts *charts;
+    vshi_texels *texels;
+    vshi_texel_samples samples; /* one a texel */
+    float *ao, *coverage;
+    vsh_bake_stats stats;
+} baked;
+
+static vsh_occluders *trace_mesh(const vsh_mesh *mesh, int32_t resolution) {
+    vsh_occluders_options options = vsh_occluders_options_default();
+    options.grid.resolution = resolution;
+    vsh_occluders *occluders = NULL;
+    assert_ok(vsh_occluders_create(mesh, 1, &options, NULL, &occluders, &failure));
+    return occluders;
+}
+
+static baked bake(const vsh_mesh *mesh, int32_t resolution, double distance) {
+    baked b = {.stats = vsh_bake_stats_zero()};
+    OWNED(vsh_occluders) *occluders = trace_mesh(mesh, resolution);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    options.ao_spacing = 1;
+    options.shade.method = VSH_SHADOW_EXACT;
+    options.shade.ao_method = VSH_AO_EXACT;
+    options.shade.ao_distance = distance;
+    options.shade.rays = 16;
+    assert_ok(vsh_charts_create(mesh, 1, &options, NULL, NULL, &b.charts, &failure));
+    assert_ok(vshi_texels_create(b.charts, NULL, &b.texels, &failure));
+    b.samples = vshi_texels_samples(b.texels);
+    b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
+    b.coverage = calloc(SIZE * SIZE, sizeof *b.coverage);
+    const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
+    assert_ok(vsh_bake_lightmap(occluders, b.charts, NULL, 0, NULL, NULL, &lightmap, &b.stats, &failure));
+    return b;
+}
+
+static void free_baked(baked *b) {
+    vshi_texels_free(b->texels);
+    vsh_charts_free(b->charts);
+    free(b->ao);
+    free(b->coverage);
+}
+
+static bool is_valid(const baked *b, size_t i) {
+    return b->coverage[vsh_texel_place(b->samples.texels[i], SIZE)] == 1.0f;
+}
 
 /* How deep a point is in the deepest of the boxes. */
 static double depth_in(const shape *s, const double p[3]) {
@@ -17,11 +142,9 @@ static double depth_in(const shape *s, const double p[3]) {
 
 /* How deep the boxes hold what is a hair above a sample. */
 static double depth_above(const shape *s, const baked *b, size_t i) {
+    const float *n = b->samples.geometric_normals + 3 * i;
     double above[3];
-    for (size_t axis = 0; axis < 3; ++axis) {
-        above[axis] =
-            b->samples.positions[3 * i + axis] + 1e-3 * (double)b->samples.geometric_normals[3 * i + axis];
-    }
+    go_along(b->samples.positions + 3 * i, 1e-3, (const double[]){n[0], n[1], n[2]}, above);
     return depth_in(s, above);
 }
 
@@ -31,7 +154,7 @@ static float ao_of(const baked *b, size_t i) {
 
 static baked bake_shape(shape *s, int32_t resolution, double distance) {
     const vsh_mesh mesh = mesh_of(s);
-    return bake(&mesh, resolution, 0, distance);
+    return bake(&mesh, resolution, distance);
 }
 
 /* Samples whose validity is not that of the boxes, a hair above the surface. */
@@ -101,7 +224,7 @@ static void quad_at(shape *s, double y, double low, double high) {
     add_quad(s, corners);
 }
 
-TEST(decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid) {
+TEST(decals_and_a_floor_under_cloth_are_valid) {
     FREED shape *s = calloc(1, sizeof *s);
     add_box(s, (box){{-4.0, -0.5, -4.0}, {4.0, 0.0, 4.0}});
     quad_at(s, 1e-4, -1.0, 0.0); /* the decal */
@@ -124,14 +247,13 @@ TEST(decals_a_hair_off_a_floor_and_what_lies_under_cloth_are_valid) {
 /* Adds a sphere around a place, without its quads nearer than `hole` to the +z axis; the angle in radians. */
 static void add_sphere(shape *s, double radius, double z, double hole) {
     enum { RINGS = 24, SECTORS = 32 };
-    const double pi = 3.14159265358979323846;
     for (int ring = 0; ring < RINGS; ++ring) {
-        const double a0 = hole + (pi - hole) * ring / RINGS, a1 = hole + (pi - hole) * (ring + 1) / RINGS;
+        const double a0 = hole + (PI - hole) * ring / RINGS, a1 = hole + (PI - hole) * (ring + 1) / RINGS;
         for (int sector = 0; sector < SECTORS; ++sector) {
             double corners[4][3];
             for (int k = 0; k < 4; ++k) {
                 const double a = k == 1 || k == 2 ? a1 : a0;
-                const double b = 2.0 * pi * ((sector + (k >= 2)) % SECTORS) / SECTORS;
+                const double b = 2.0 * PI * ((sector + (k >= 2)) % SECTORS) / SECTORS;
                 const double across = ring + 1 == RINGS && a == a1 ? 0.0 : radius * sin(a);
                 corners[k][0] = across * cos(b);
                 corners[k][1] = across * sin(b);
@@ -187,14 +309,7 @@ TEST(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far) {
     add_box(s, (box){{-4.0, -4.0, -4.0}, {4.0, 4.0, 4.0}});
     add_box(s, (box){{-0.01, 4.0, -0.01}, {0.01, 5.0, 0.01}}); /* less than a voxel thick */
     const vsh_mesh mesh = mesh_of(s);
-    vsh_grid_options grid_options = vsh_grid_options_default();
-    grid_options.resolution = 64;
-    OWNED(vsh_grid) *grid = NULL;
-    OWNED(vsh_field) *field = NULL;
-    OWNED(vsh_triangles) *triangles = NULL;
-    assert_ok(vsh_grid_from_meshes(&mesh, 1, &grid_options, NULL, &grid, &failure));
-    assert_ok(vsh_field_create(grid, NULL, NULL, &field, &failure));
-    assert_ok(vsh_triangles_create(&mesh, 1, NULL, &triangles, &failure));
+    OWNED(vsh_occluders) *occluders = trace_mesh(&mesh, 64);
     const double positions[9] = {0.0, 0.0, 0.0, 2.0, 4.0, 2.0, 0.0, 4.5, 0.0};
     const float normals[9] = {0, 1, 0, 0, 1, 0, 1, 0, 0};
     const vsh_points points = {.count = 3, .positions = positions, .normals = normals};
@@ -202,11 +317,8 @@ TEST(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far) {
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.5;
     float ao[3];
-    assert_ok(vsh_shade_ao(occluders_traced(field, triangles), &points, &options, NULL, ao, NULL, NULL, NULL,
-                           &failure));
-    assert_true(ao[0] == 0.0f);
-    assert_true(ao[1] > 0.95f);
-    assert_true(ao[2] == 0.0f);
+    assert_ok(vsh_shade_ao(occluders, &points, &options, NULL, ao, NULL, NULL, NULL, &failure));
+    assert_true(ao[0] == 0.0f && ao[1] > 0.95f && ao[2] == 0.0f);
 }
 
 /* A floor of one chart with a box on it, as wide as `half`: its texels under the box. */
@@ -220,23 +332,22 @@ TEST(invalid_texels_take_the_nearest_value_of_their_chart) {
     for (size_t i = 8; i < 8 * s->quads; i += 2) {
         s->uvs[i + 1] = 0.92f + 0.07f * s->uvs[i + 1];
     }
-    FREED_BY(free_baked) baked b = bake(&mesh, 32, 0, 1.0);
+    FREED_BY(free_baked) baked b = bake(&mesh, 32, 1.0);
     size_t filled = 0;
     for (size_t i = 0; i < b.samples.count; ++i) {
         const double *p = b.samples.positions + 3 * i;
         if (p[1] == 0.0 && fabs(p[0]) < 1.45 && fabs(p[2]) < 1.45) {
             ++filled;
             assert_false(is_valid(&b, i));
-            /* half of the sky is hidden beside a wall; nothing is as dark as no value, nor as light as what
-             * is far away */
+            /* beside a wall half of the sky is hidden: no texel is as dark as one without a value, or as
+             * light as the open floor */
             assert_true(ao_of(&b, i) > 0.2f && ao_of(&b, i) < 0.85f);
         }
     }
     assert_true(filled > 5000);
 }
 
-/* --- Which texels of a lightmap are valid where it is close: narrow gaps, and what is seen past an open end.
- */
+/* --- narrow gaps, and places that are seen past an open end */
 
 /* Two boxes, the upper one a millionth and a half of the scene's size over the lower: more than the roundings
  * of floats, less than rays are lifted by. */
@@ -264,7 +375,7 @@ TEST(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid) {
  * rays from beside it go into it, most do not. */
 TEST(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid) {
     enum { AROUND = 24, ALONG = 16, TOP = 3 };
-    static const double PI = 3.14159265358979323846, BEND = 0.6, RADIUS = 0.15;
+    static const double BEND = 0.6, RADIUS = 0.15;
     FREED shape *s = calloc(1, sizeof *s);
     add_box(s, (box){{-0.4, -0.1, -1.0}, {0.4, 0.0, 0.4}});
     for (int k = 0; k < AROUND * ALONG; ++k) {
@@ -285,7 +396,7 @@ TEST(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid) {
     }
     const float top[8] = {0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 0.9f, 0.0f, 0.9f};
     memcpy(s->uvs + 8 * TOP, top, sizeof top);
-    FREED_BY(free_baked) baked b = bake(&mesh, 32, 0, 1.0);
+    FREED_BY(free_baked) baked b = bake(&mesh, 32, 1.0);
     size_t beside = 0, wrong = 0;
     for (size_t i = 0; i < b.samples.count; ++i) {
         const double *p = b.samples.positions + 3 * i;
@@ -342,7 +453,7 @@ TEST(texels_on_the_side_of_a_box_are_filled_from_the_open) {
 }
 
 /* The room's floor is a wall with air behind it, so nothing is met from beneath it. */
-TEST(what_stands_on_a_floor_with_air_beneath_it_is_invalid_there) {
+TEST(undersides_on_a_floor_with_air_beneath_it_are_invalid) {
     for (int kind = 0; kind < 3; ++kind) { /* on a plane, in a room, in a mirrored room */
         FREED shape *s = calloc(1, sizeof *s);
         if (kind > 0) {
@@ -356,7 +467,7 @@ TEST(what_stands_on_a_floor_with_air_beneath_it_is_invalid_there) {
         vsh_mesh mesh = mesh_of(s);
         static const double mirror[12] = {-1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
         mesh.transform = kind == 2 ? mirror : NULL;
-        FREED_BY(free_baked) baked b = bake(&mesh, 48, 0, 1.0);
+        FREED_BY(free_baked) baked b = bake(&mesh, 48, 1.0);
         size_t under = 0, over = 0;
         for (size_t i = 0; i < b.samples.count; ++i) {
             const double y = b.samples.positions[3 * i + 1];
@@ -371,5 +482,144 @@ TEST(what_stands_on_a_floor_with_air_beneath_it_is_invalid_there) {
             }
         }
         assert_true(under > 100 && over > 200);
+    }
+}
+
+/* --- lightmaps as a viewer sees them */
+
+/* 250: some charts then end in texels whose centres lie outside. */
+enum { TEXELS = 250, POINTS = 5000, RAYS = 1024 };
+
+static const double LIFT = 1e-5 * 4.0; /* of the room's size */
+static const double WRONG = 0.25, AO_DISTANCE = 1.0;
+static const double SUN_ANGLE = 0.7; /* wide, so that texels resolve the penumbra where things touch */
+static const double SUN[3] = {0.4, 0.8, 0.3};
+
+/* Random points of the surface, lifted off it, and their truth. */
+typedef struct points {
+    double at[3 * POINTS], uv[2 * POINTS];
+    float normal[3 * POINTS];
+    float ao[POINTS], shadow[POINTS], backs[POINTS];
+} points;
+
+static double number(size_t i, double irrational) {
+    return fmod((double)(i + 1) * irrational, 1.0);
+}
+
+/* Sets point i of `p`: a place on quad q, which is a rectangle. */
+static void place_on_quad(const shape *s, size_t q, double across, double along, points *p, size_t i) {
+    double edge[2][3], g[3];
+    for (size_t k = 0; k < 3; ++k) {
+        const float *corner = s->positions + 12 * q + k;
+        edge[0][k] = (double)(corner[3] - corner[0]);
+        edge[1][k] = (double)(corner[9] - corner[0]);
+        p->at[3 * i + k] = (double)corner[0] + across * edge[0][k] + along * edge[1][k];
+    }
+    for (size_t k = 0; k < 3; ++k) {
+        g[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] - edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
+    }
+    const double area = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    for (size_t k = 0; k < 3; ++k) {
+        p->normal[3 * i + k] = (float)(g[k] / area);
+        p->at[3 * i + k] += LIFT * g[k] / area;
+    }
+    for (size_t k = 0; k < 2; ++k) {
+        const float *uv = s->uvs + 8 * q + k;
+        p->uv[2 * i + k] = (double)uv[0] + across * (double)(uv[2] - uv[0]) + along * (double)(uv[6] - uv[0]);
+    }
+}
+
+static points *place_points(const shape *s) {
+    points *p = calloc(1, sizeof *p);
+    double area[MOST_QUADS], sum = 0.0;
+    for (size_t q = 0; q < s->quads; ++q) {
+        const float *c = s->positions + 12 * q;
+        area[q] = sum += hypot(hypot((double)(c[3] - c[0]), (double)(c[4] - c[1])), (double)(c[5] - c[2])) *
+                         hypot(hypot((double)(c[9] - c[0]), (double)(c[10] - c[1])), (double)(c[11] - c[2]));
+    }
+    for (size_t i = 0, q = 0; i < POINTS; ++i) {
+        while (area[q] < ((double)i + 0.5) / POINTS * sum) {
+            ++q;
+        }
+        place_on_quad(s, q, number(i, 0.7548776662466927), number(i, 0.5698402909980532), p, i);
+    }
+    return p;
+}
+
+static double look_up(const float *plane, const double uv[2]) {
+    const double x = fmin(TEXELS - 1.0, fmax(0.0, uv[0] * TEXELS - 0.5));
+    const double y = fmin(TEXELS - 1.0, fmax(0.0, (1.0 - uv[1]) * TEXELS - 0.5));
+    double sum = 0.0;
+    for (int k = 0; k < 4; ++k) {
+        const double column = floor(x) + k % 2, row = floor(y) + k / 2;
+        const double weight = (1.0 - fabs(x - column)) * (1.0 - fabs(y - row));
+        sum += weight > 0.0 ? weight * (double)plane[(size_t)row * TEXELS + (size_t)column] : 0.0;
+    }
+    return sum;
+}
+
+static void trace_points(const vsh_mesh *mesh, points *p) {
+    OWNED(truth_mesh) *truth = truth_mesh_create(mesh, 1);
+    const double w = tan(0.5 * SUN_ANGLE);
+    assert_non_null(truth);
+    assert_int_equal(truth_mesh_backs(truth, POINTS, p->at, p->normal, 96, 0, p->backs), 0);
+    assert_int_equal(truth_mesh_ao(truth, POINTS, p->at, p->normal, AO_DISTANCE, RAYS, 0, p->ao), 0);
+    assert_int_equal(truth_mesh_light(truth, POINTS, p->at, p->normal, SUN, w, RAYS, 0, p->shadow), 0);
+}
+
+static void bake_planes(const vsh_mesh *mesh, float *ao, float *shadow) {
+    OWNED(vsh_occluders) *occluders = trace_mesh(mesh, 0);
+    OWNED(vsh_charts) *charts = NULL;
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = TEXELS;
+    options.shade.ao_distance = AO_DISTANCE;
+    options.shade.max_error = 0.005;
+    options.shade.rays = 1024;
+    assert_ok(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &failure));
+    vsh_light sun = vsh_light_default();
+    memcpy(sun.direction, SUN, sizeof SUN);
+    sun.angle = SUN_ANGLE;
+    float *const shadows[1] = {shadow};
+    const vsh_lightmap lightmap = {.ao = ao, .shadow = shadows};
+    assert_ok(vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, NULL, &lightmap, NULL, &failure));
+}
+
+static void compare_seen(const points *p, const char *what, const float *plane, const float *truth) {
+    size_t count = 0, dark = 0;
+    double square = 0.0;
+    for (size_t i = 0; i < POINTS; ++i) {
+        const bool underside = p->at[3 * i + 1] < 1e-3 && p->normal[3 * i + 1] < -0.5f;
+        if (p->backs[i] > 0.05f || underside) {
+            continue; /* under the chest, or its own face on the floor */
+        }
+        const double error = look_up(plane, p->uv + 2 * i) - (double)truth[i];
+        ++count;
+        square += error * error;
+        dark += !(error >= -WRONG);
+    }
+    const double rmse = sqrt(square / (double)count);
+    assert_that(dark == 0 && rmse <= 0.01, "%s: %zu of %zu points are too dark by a quarter, RMSE %g", what,
+                dark, count, rmse);
+}
+
+TEST(rooms_are_not_seen_darker_along_corners) {
+    static const box ROOM = {{-2, 0, -2}, {2, 3, 2}};
+    /* Its lower sides pass through centres of the floor's texels. */
+    static const box CHEST = {{-0.46, 0, -0.46}, {0.46, 0.83, 0.39}};
+    for (int open = 0; open < 2; ++open) {
+        FREED shape *s = calloc(1, sizeof *s);
+        FREED float *planes = calloc(2 * TEXELS * TEXELS, sizeof *planes);
+        add_faces(s, CHEST, false);
+        add_faces(s, ROOM, true);
+        if (open) { /* the fourth of the room's quads is its ceiling: the last takes its place */
+            memcpy(s->positions + 12 * 9, s->positions + 12 * 11, 12 * sizeof *s->positions);
+            --s->quads;
+        }
+        const vsh_mesh mesh = mesh_of(s);
+        FREED points *p = place_points(s);
+        trace_points(&mesh, p);
+        bake_planes(&mesh, planes, planes + TEXELS * TEXELS);
+        compare_seen(p, open ? "AO under the sky" : "AO", planes, p->ao);
+        compare_seen(p, open ? "sun" : "sun outside", planes + TEXELS * TEXELS, p->shadow);
     }
 }

@@ -1,5 +1,5 @@
-// Volumes and .vdb files: the voxels of other grids, and what OpenVDB reads of what is written. In C++, to
-// write and read with OpenVDB what the library's own calls do not.
+// Volumes and .vdb files: the voxels of other grids, and volumes as OpenVDB reads them. It is C++ because
+// the library's own calls cannot write or read all of these files.
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +15,8 @@
 // Last: testing.h has macros named as OpenVDB's members are.
 #include "previews.h"
 #include "testing.h"
+
+#include "levelset/access.h"
 
 namespace {
 
@@ -55,11 +57,8 @@ vsh_voxels_info info_of(const vsh_voxels *voxels) {
 // A unit ball at the origin.
 vsh_occluders *ball() {
     vsh_sdf_node node = vsh_sdf_node_default();
-    const vsh_sdf tree = {&node, 1};
-    const vsh_grid_options options = with_voxel(0.1);
-    OWNED(vsh_grid) *grid = nullptr;
+    OWNED(vsh_grid) *grid = grid_of_tree(&node, 1, with_voxel(0.1));
     vsh_occluders *occluders = nullptr;
-    assert_int_equal(vsh_grid_from_sdf(&tree, &options, nullptr, &grid, &failure), VSH_OK);
     assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &failure), VSH_OK);
     return occluders;
 }
@@ -109,7 +108,7 @@ FloatGrid::Ptr fog() {
     return grid;
 }
 
-TEST(a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles) {
+TEST(a_fog_is_lit_on_its_voxels_and_its_tiles) {
     const FloatGrid::Ptr source = fog();
     const std::string path = save("fog.vdb", {source});
     OWNED(vsh_voxels) *voxels = like(path, "density");
@@ -121,7 +120,7 @@ TEST(a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles) {
     assert_true(std::fabs(info.voxel_size[1] / info.voxel_size[0] - 2.0) < 1e-12);
     const int32_t index[3] = {17, 18, 19};
     double centre[3];
-    vsh_voxels_centre(voxels, index, centre);
+    vshi_voxels_centre(voxels, index, centre);
     assert_true((Vec3d(centre) - source->indexToWorld(Coord(17, 18, 19))).length() < 1e-12);
 
     OWNED(vsh_occluders) *occluders = ball();
@@ -150,7 +149,7 @@ TEST(a_fog_is_lit_on_its_own_voxels_and_those_of_its_tiles) {
     assert_true(dark > 1000 && light > 100);
 }
 
-TEST(grids_of_any_numbers_will_do_and_the_first_is_taken) {
+TEST(grids_of_any_type_are_read_and_the_first_is_the_default) {
     const auto vectors = openvdb::Vec3SGrid::create();
     vectors->setName("velocity");
     vectors->fill(CoordBBox(0, 0, 0, 3, 3, 3), openvdb::Vec3s(1.0f));
@@ -199,7 +198,7 @@ TEST(a_frustum_keeps_its_map) {
     assert_true(dark > 10);
 }
 
-TEST(what_has_no_voxels_is_refused) {
+TEST(grids_without_voxels_are_refused) {
     vsh_voxels *voxels = nullptr;
     const auto refused = [&](const std::string &path, const char *name, vsh_result code,
                              std::initializer_list<const char *> parts) {
@@ -273,7 +272,7 @@ TEST(other_programs_read_names_class_metadata_and_halves) {
     assert_string_equal(entries[1].grid_class, "unknown");
     assert_int_equal(entries[1].active_voxels, full->activeVoxelCount());
 
-    // what the library copies is what OpenVDB reads
+    // the library copies the values that OpenVDB reads
     const int32_t from[3] = {0, 0, 0}, size[3] = {40, 40, 40};
     std::vector<float> values(40 * 40 * 40);
     assert_int_equal(vsh_volume_copy(volume, 0, from, size, values.data(), &failure), VSH_OK);

@@ -1,5 +1,6 @@
-/* Windows over texels: what is known of each by the help of those around it. Truth is the share that a test's
- * own rays are drawn by. */
+/* Windows over texels: what is known of each by the help of those around it. The truth is the share by which
+ * a test draws its own rays. And which neighbouring texels hang together: charts as an atlas may lay them
+ * out, whose surfaces are known. */
 #include "fields.h"
 #include "testing.h"
 
@@ -19,7 +20,6 @@ typedef struct table {
 static table *make_table(int32_t width, int32_t height, int32_t rays) {
     assert_true(width * height <= TEXELS && (width + 1) * (height + 1) <= (EDGE + 1) * (EDGE + 1));
     table *t = calloc(1, sizeof *t);
-    assert_non_null(t);
     t->windows = (vshi_windows){width, height, t->texels, t->sums};
     for (int32_t y = 0; y < height; ++y) {
         for (int32_t x = 0; x < width; ++x) {
@@ -64,8 +64,8 @@ static void cut(table *t, const uint8_t *area) {
 TEST(planes_without_noise_are_exact_up_to_corners) {
     static const int32_t sizes[][2] = {{40, 30}, {8, 8}, {64, 1}, {1, 64}, {3, 50}, {50, 5}, {2, 2}, {1, 1}};
     static const double slopes[][2] = {{0.0, 0.0}, {0.004, 0.0}, {-0.003, 0.006}, {0.009, 0.005}};
-    for (size_t k = 0; k < sizeof sizes / sizeof sizes[0]; ++k) {
-        for (size_t s = 0; s < sizeof slopes / sizeof slopes[0]; ++s) {
+    for (size_t k = 0; k < COUNT_OF(sizes); ++k) {
+        for (size_t s = 0; s < COUNT_OF(slopes); ++s) {
             const int32_t width = sizes[k][0], height = sizes[k][1];
             FREED table *t = make_table(width, height, 8);
             for (int32_t i = 0; i < width * height; ++i) {
@@ -118,7 +118,8 @@ static void fill(table *t, share_fn *share, uint64_t seed) {
 
 /* Root mean squares over a table. */
 typedef struct errors {
-    double is, said, own, specks; /* of a texel's own rays; share that is off by more than 0.06 */
+    double is, said, own,
+        specks; /* own: of a texel's own rays; specks: share that is off by more than 0.06 */
 } errors;
 
 static errors errors_of(const table *t, share_fn *share) {
@@ -135,7 +136,7 @@ static errors errors_of(const table *t, share_fn *share) {
     return (errors){sqrt(sum.is / count), sqrt(sum.said / count), sqrt(sum.own / count), sum.specks / count};
 }
 
-TEST(noise_that_is_left_is_what_is_said) {
+TEST(the_stated_error_is_the_noise_that_is_left) {
     share_fn *const shares[] = {even, ramp, open};
     for (size_t s = 0; s < 3; ++s) {
         for (int32_t rays = 8; rays <= 128; rays *= 4) {
@@ -175,7 +176,7 @@ TEST(edges_stay_sharp) {
     }
 }
 
-/* Beside what is half hidden, texels whose rays are all free keep their value. */
+/* Texels whose rays are all free keep their value beside texels that are half hidden. */
 TEST(open_texels_beside_an_edge_stay_open) {
     FREED table *t = make_table(EDGE, EDGE, 64);
     uint64_t counter = 4;
@@ -212,7 +213,7 @@ static bool is_same(vshi_window_estimate a, vshi_window_estimate b) {
     return memcmp(&a, &b, sizeof a) == 0;
 }
 
-TEST(nothing_comes_over_a_cut) {
+TEST(no_value_crosses_a_cut) {
     static uint8_t area[TEXELS];
     draw_areas(area);
     FREED table *t = make_table(EDGE, EDGE, 32), *other = make_table(EDGE, EDGE, 32);
@@ -313,4 +314,265 @@ TEST(few_rays_leave_few_specks) {
         least = fmin(least, estimate_at(t, i % EDGE, i / EDGE).deviation);
     }
     assert_true(e.specks < 0.005 && least > 0.005);
+}
+
+/* --- which texels hang together */
+
+enum { WIDTH = 24, HEIGHT = 16, PIXELS = WIDTH * HEIGHT };
+
+/* An image of points; `at` as vshi_links_find() wants it, points in another order than texels. */
+typedef struct image {
+    double positions[3 * PIXELS]; /* as laid, */
+    float scaled[3 * PIXELS];     /* and from the first of them, at a scale */
+    float normals[3 * PIXELS];
+    uint32_t at[PIXELS];
+    vshi_window_texel texels[PIXELS];
+} image;
+
+static size_t point_of(int32_t x, int32_t y) {
+    return (size_t)(5 * (y * WIDTH + x) + 3) % PIXELS; /* 5 has no factor of the number of texels */
+}
+
+static void set_point(image *m, int32_t x, int32_t y, const double position[3], const double normal[3]) {
+    const size_t i = point_of(x, y);
+    memcpy(m->positions + 3 * i, position, 3 * sizeof(double));
+    for (size_t axis = 0; axis < 3; ++axis) {
+        m->normals[3 * i + axis] = (float)normal[axis];
+    }
+    m->at[y * WIDTH + x] = (uint32_t)i + 1;
+}
+
+static vshi_texel_map map_of(image *m, double scale) {
+    for (size_t i = 0; i < 3 * PIXELS; ++i) {
+        m->scaled[i] = (float)(scale * (m->positions[i] - m->positions[i % 3]));
+    }
+    return (vshi_texel_map){
+        .width = WIDTH, .height = HEIGHT, .at = m->at, .position = m->scaled, .normal = m->normals};
+}
+
+static void find_links(image *m, double scale) {
+    memset(m->texels, 0, sizeof m->texels);
+    const vshi_texel_map map = map_of(m, scale);
+    const vshi_texel_lattice all = {0, 0, 1, WIDTH, HEIGHT};
+    vshi_links_find(&map, &all, m->texels);
+}
+
+/* Whether two neighbouring texels should hang together. */
+typedef bool expected_fn(int32_t x0, int32_t y0, int32_t x1, int32_t y1);
+
+/* At scales from a millionth to a million: links do not depend on them. */
+static void assert_links(image *m, expected_fn *expected) {
+    static const double scales[] = {1.0, 1e-6, 1e6, 0.37};
+    for (size_t s = 0; s < COUNT_OF(scales); ++s) {
+        find_links(m, scales[s]);
+        for (int32_t y = 0; y < HEIGHT; ++y) {
+            for (int32_t x = 0; x < WIDTH; ++x) {
+                const vshi_window_texel *e = &m->texels[y * WIDTH + x];
+                const bool left = x > 0 && expected(x - 1, y, x, y),
+                           above = y > 0 && expected(x, y - 1, x, y);
+                assert_that(e->left == left && e->above == above, "scale %g, texel %d, %d: left %d, above %d",
+                            scales[s], x, y, e->left, e->above);
+            }
+        }
+    }
+}
+
+static bool always(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return x0 >= 0 && y0 >= 0 && x1 < WIDTH && y1 < HEIGHT;
+}
+
+/* Columns before this are one chart, the others another. */
+enum { BORDER = 11 };
+
+static bool on_one_side(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return (x0 < BORDER) == (x1 < BORDER);
+}
+
+static bool on_one_side_of_rows(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return (y0 < BORDER) == (y1 < BORDER);
+}
+
+/* A point of a surface for each texel; `how` is what a layout takes. */
+typedef void layout_fn(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]);
+
+static void lay(image *m, layout_fn *layout, double first, double second) {
+    for (int32_t i = 0; i < PIXELS; ++i) {
+        double position[3] = {0}, normal[3] = {0.0, 1.0, 0.0};
+        layout(i % WIDTH, i / WIDTH, (const double[2]){first, second}, position, normal);
+        set_point(m, i % WIDTH, i / WIDTH, position, normal);
+    }
+}
+
+/* A plane that stands askew, its steps how[0] and how[1] long; far from the origin. */
+static void plane(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const double a[3] = {0.6, 0.48, 0.64}, b[3] = {0.8, -0.36, -0.48};
+    for (size_t axis = 0; axis < 3; ++axis) {
+        position[axis] = 70.0 + how[0] * x * a[axis] + how[1] * y * b[axis];
+    }
+    memcpy(normal, (const double[3]){0.0, -0.8, 0.6}, 3 * sizeof *normal);
+}
+
+/* Of 60 texels around, whose neighbours' normals are 6 degrees apart. */
+static void cylinder(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    normal[0] = position[0] = cos(0.1047 * x);
+    normal[2] = position[2] = sin(0.1047 * x);
+    normal[1] = 0.0;
+    position[1] = 0.1 * y;
+}
+
+/* A floor whose chart goes on up a wall, in the image as in the world. */
+static void floor_and_wall(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const bool wall = x >= BORDER;
+    position[wall ? 1 : 0] = 0.1 * (x - BORDER + 0.5);
+    position[2] = 0.1 * y;
+    normal[0] = wall ? -1.0 : 0.0;
+    normal[1] = wall ? 0.0 : 1.0;
+}
+
+/* Two pieces of one floor: neighbours in the image, how[0] texels apart in the world, in rows if how[1]. */
+static void pieces(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const bool rows = how[1] != 0.0;
+    position[0] = 0.1 * (x + (!rows && x >= BORDER ? how[0] - 1.0 : 0.0));
+    position[2] = 0.1 * (y + (rows && y >= BORDER ? how[0] - 1.0 : 0.0));
+}
+
+/* Fine texels beside coarse ones, whose step the one between them is not too long for. */
+static void sizes(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    const bool rows = how[1] != 0.0;
+    const int32_t off = rows ? y - BORDER : x - BORDER;
+    const double step = (off < 0) == (how[0] != 0.0) ? 1.0 : 0.1;
+    position[rows ? 2 : 0] = off < 0 ? step * (off + 1) : 2.0 + step * off;
+    position[rows ? 0 : 2] = step * (rows ? x : y);
+}
+
+/* Two floors, one how[0] over the other. */
+static void two_floors(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    position[0] = 0.1 * x;
+    position[1] = x < BORDER ? 0.0 : how[0];
+    position[2] = 0.1 * y;
+}
+
+static void two_sides(int32_t x, int32_t y, const double how[2], double position[3], double normal[3]) {
+    position[0] = 0.1 * x;
+    position[2] = 0.1 * y;
+    normal[1] = x < BORDER ? 1.0 : -1.0;
+}
+
+TEST(texels_are_linked_within_a_surface_and_not_between_two) {
+    static const struct {
+        layout_fn *layout;
+        double how[2];
+        expected_fn *expected;
+    } cases[] = {
+        {plane, {0.03, 0.03}, always},
+        {plane, {0.09, 0.03}, always}, /* stretched */
+        {plane, {0.03, 0.09}, always},
+        {cylinder, {0.0, 0.0}, always},
+        {floor_and_wall, {0.0, 0.0}, on_one_side},
+        {pieces, {1000.0, 0.0}, on_one_side},
+        {pieces, {10.0, 0.0}, on_one_side},
+        {pieces, {5.0, 0.0}, on_one_side},
+        {pieces, {-5.0, 0.0}, on_one_side},
+        {pieces, {-300.0, 0.0}, on_one_side},
+        {pieces, {1000.0, 1.0}, on_one_side_of_rows},
+        {pieces, {10.0, 1.0}, on_one_side_of_rows},
+        {pieces, {5.0, 1.0}, on_one_side_of_rows},
+        {pieces, {-5.0, 1.0}, on_one_side_of_rows},
+        {pieces, {-300.0, 1.0}, on_one_side_of_rows},
+        {pieces, {2.0, 0.0}, always}, /* a texel that is left out of one surface makes no border */
+        {sizes, {0.0, 0.0}, on_one_side},
+        {sizes, {1.0, 0.0}, on_one_side},
+        {sizes, {0.0, 1.0}, on_one_side_of_rows},
+        {sizes, {1.0, 1.0}, on_one_side_of_rows},
+        {two_floors, {0.05, 0.0}, on_one_side},
+        {two_floors, {0.1, 0.0}, on_one_side},
+        {two_floors, {0.3, 0.0}, on_one_side},
+        {two_floors, {-0.05, 0.0}, on_one_side},
+        {two_floors, {-2.0, 0.0}, on_one_side},
+        {two_sides, {0.0, 0.0}, on_one_side},
+    };
+    static image m;
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        lay(&m, cases[i].layout, cases[i].how[0], cases[i].how[1]);
+        assert_links(&m, cases[i].expected);
+    }
+}
+
+static bool in_one_row(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return y0 == y1 && y0 % 2 == 0 && on_one_side(x0, y0, x1, y1);
+}
+
+static bool in_one_column(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return x0 == x1 && x0 % 2 == 0 && on_one_side_of_rows(x0, y0, x1, y1);
+}
+
+static bool in_one_later_row(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return x0 >= BORDER && in_one_row(x0, y0, x1, y1);
+}
+
+static bool in_one_lower_column(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return y0 >= BORDER && in_one_column(x0, y0, x1, y1);
+}
+
+/* Charts a texel wide, of which each has but one other step that tells how long they are; or of a texel. */
+TEST(strips_that_are_apart_on_the_surface_are_not_linked) {
+    static image m;
+    static expected_fn *const expected[2][2] = {{in_one_row, in_one_later_row},
+                                                {in_one_column, in_one_lower_column}};
+    for (int32_t turned = 0; turned < 2; ++turned) {
+        for (int32_t lone = 0; lone < 2; ++lone) {
+            lay(&m, pieces, 50.0, turned);
+            for (int32_t i = 0; i < PIXELS; ++i) {
+                const int32_t along = turned ? i / WIDTH : i % WIDTH, across = turned ? i % WIDTH : i / WIDTH;
+                const bool gone = across % 2 != 0 || (lone && along < BORDER - 1);
+                m.at[i] = gone ? 0 : m.at[i];
+            }
+            assert_links(&m, expected[turned][lone]);
+        }
+    }
+}
+
+static bool is_hole(int32_t x, int32_t y) {
+    return (x * 7 + y * 3) % 11 == 0 || x == 5;
+}
+
+static bool without_holes(int32_t x0, int32_t y0, int32_t x1, int32_t y1) {
+    return !is_hole(x0, y0) && !is_hole(x1, y1);
+}
+
+TEST(texels_without_a_point_have_no_links) {
+    static image m;
+    lay(&m, plane, 0.03, 0.03);
+    for (int32_t i = 0; i < PIXELS; ++i) {
+        m.at[i] = is_hole(i % WIDTH, i / WIDTH) ? 0 : m.at[i];
+    }
+    assert_links(&m, without_holes);
+}
+
+/* A column of texels without points, as under the wall of a shed, lies between those of a lattice. */
+TEST(lattices_are_not_linked_over_a_gap_between_their_texels) {
+    enum { SPACING = 4, GAP = 10, COLUMNS = WIDTH / SPACING, ROWS = HEIGHT / SPACING };
+    static image m;
+    lay(&m, plane, 0.03, 0.03);
+    for (int32_t y = 0; y < HEIGHT; ++y) {
+        m.at[y * WIDTH + GAP] = 0;
+    }
+    const vshi_texel_map map = map_of(&m, 1.0);
+    const vshi_texel_lattice lattice = {0, 0, SPACING, COLUMNS, ROWS};
+    vshi_window_texel texels[COLUMNS * ROWS] = {{0}};
+    vshi_links_find(&map, &lattice, texels);
+    for (int32_t y = 0; y < ROWS; ++y) {
+        for (int32_t x = 0; x < COLUMNS; ++x) {
+            const bool over = GAP / SPACING == x - 1;
+            assert_int_equal(texels[y * COLUMNS + x].left, x > 0 && !over);
+            assert_int_equal(texels[y * COLUMNS + x].above, y > 0);
+            if (x + 1 < COLUMNS && y + 1 < ROWS) {
+                const int32_t from[2] = {SPACING * x + 1, SPACING * y + 1},
+                              to[2] = {SPACING * (x + 1), SPACING * (y + 1)};
+                const bool gap = GAP / SPACING == x;
+                assert_int_equal(vshi_links_whole(&map, SPACING * x, SPACING * y, SPACING), !gap);
+                assert_int_equal(vshi_links_lead(&map, from, to), !gap);
+            }
+        }
+    }
 }

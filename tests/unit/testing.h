@@ -29,6 +29,31 @@ __attribute__((weak)) int run_listed_tests(void);
 
 #include <vdbshade/vdbshade.h>
 
+#ifndef __cplusplus
+#include "bake/planes.h"
+#include "bake/texels.h"
+#include "base/job.h"
+#include "bindings/bindings.h"
+#include "compare/compare.h"
+#include "field/field.h"
+#include "flat/flat.h"
+#include "heightfield/heights.h"
+#include "image/image.h"
+#include "levelset/access.h"
+#include "lit/work.h"
+#include "mesh/mesh.h"
+#include "method/method.h"
+#include "model/model.h"
+#include "outline/outline.h"
+#include "scene/assets.h"
+#include "scene/scene.h"
+#include "sdf/sdf.h"
+#include "shade/occluders.h"
+#include "shade/shade.h"
+#include "spheres/spheres.h"
+#include "trace/trace.h"
+#endif
+
 enum { MOST_TESTS = 64 };
 
 static struct CMUnitTest listed_tests[MOST_TESTS];
@@ -141,7 +166,7 @@ static inline vsh_run run_watched(vsh_progress_fn *progress, void *user) {
 /* --- memory */
 
 /* These variables free what they hold where their block ends:
- *     OWNED(vsh_field) *field = field_of(…);    by vsh_field_free(field)
+ *     OWNED(vsh_field) *field = field_of(…);    by vshi_field_free(field)
  *     FREED float *values = malloc(…);          by free(values)
  *     FREED_BY(free_baked) baked b = bake(…);   by free_baked(&b) */
 #define FREED_BY(function) __attribute__((cleanup(function)))
@@ -164,25 +189,85 @@ OWNER(vsh_assets)
 OWNER(vsh_atlas)
 OWNER(vsh_charts)
 OWNER(vsh_comparison)
-OWNER(vsh_field)
 OWNER(vsh_flat_scene)
 OWNER(vsh_grid)
-OWNER(vsh_heights)
 OWNER(vsh_model)
 OWNER(vsh_occluders)
 OWNER(vsh_outline)
 OWNER(vsh_query)
 OWNER(vsh_scene)
-OWNER(vsh_solids)
-OWNER(vsh_spheres)
-OWNER(vsh_texels)
-OWNER(vsh_tolerances)
-OWNER(vsh_triangles)
 OWNER(vsh_volume)
 OWNER(vsh_voxels)
 
+#ifndef __cplusplus
+OWNER(vshi_heights)
+OWNER(vshi_solids)
+OWNER(vshi_spheres)
+OWNER(vshi_texels)
+OWNER(vshi_tolerances)
+OWNER(vshi_triangles)
+static inline void vsh_field_release(vsh_field **field) {
+    vshi_field_free(*field);
+}
+#endif
 static inline void vsh_image_file_release(vsh_image_file **file) {
     vsh_image_free(*file);
+}
+
+/* --- vectors and arrays */
+
+#define COUNT_OF(array) (sizeof(array) / sizeof((array)[0]))
+
+static inline double dot3(const double a[3], const double b[3]) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+static inline double length3(const double v[3]) {
+    return sqrt(dot3(v, v));
+}
+
+/* to = from + t d */
+static inline void go_along(const double from[3], double t, const double d[3], double to[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        to[axis] = from[axis] + t * d[axis];
+    }
+}
+
+static inline void assert_all_equal(const float *values, size_t count, float expected) {
+    for (size_t i = 0; i < count; ++i) {
+        assert_that(values[i] == expected, "value %zu is %.9g, not %.9g", i, (double)values[i],
+                    (double)expected);
+    }
+}
+
+/* Two triangles over the corners 0 … 3 of a quad. */
+static __attribute__((unused)) const uint32_t QUAD_INDICES[6] = {0, 1, 2, 0, 2, 3};
+
+/* --- handles and their parts */
+
+#ifndef __cplusplus
+static inline vshi_occluder_parts parts_of(const vsh_occluders *occluders) {
+    return (vshi_occluder_parts){.field = occluders->field,
+                                 .triangles = occluders->triangles,
+                                 .layers = occluders->layers,
+                                 .layer_count = occluders->layer_count,
+                                 .true_triangles = occluders->true_triangles,
+                                 .true_solids = occluders->true_solids};
+}
+#endif
+
+static inline vsh_atlas_info atlas_info(const vsh_atlas *atlas) {
+    vsh_atlas_info info;
+    vsh_atlas_get_info(atlas, &info);
+    return info;
+}
+
+/* Stitches one lightmap. */
+static inline vsh_result stitch_one(const vsh_charts *charts, const vsh_lightmap *lightmap, size_t lights,
+                                    const vsh_stitch_options *options, const vsh_run *run,
+                                    vsh_stitch_report *report, vsh_error *error) {
+    const vsh_stitch_page page = {charts, lightmap};
+    return vsh_lightmaps_stitch(&page, 1, lights, options, run, report, error);
 }
 
 /* --- meshes and grids */
@@ -191,6 +276,25 @@ static inline vsh_grid_options with_voxel(double size) {
     vsh_grid_options options = vsh_grid_options_default();
     options.voxel_size = size;
     return options;
+}
+
+static inline vsh_grid *grid_of_tree(const vsh_sdf_node *nodes, size_t count, vsh_grid_options options) {
+    const vsh_sdf tree = {nodes, count};
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_sdf(&tree, &options, NULL, &grid, &failure));
+    return grid;
+}
+
+static inline vsh_mesh quad_mesh(const char *name, const float positions[12], const float uvs[8]) {
+    vsh_mesh mesh;
+    memset(&mesh, 0, sizeof mesh);
+    mesh.name = name;
+    mesh.positions = positions;
+    mesh.uvs = uvs;
+    mesh.indices = QUAD_INDICES;
+    mesh.vertex_count = 4;
+    mesh.triangle_count = 2;
+    return mesh;
 }
 
 /* A box as a mesh of 12 triangles, which face outwards. */

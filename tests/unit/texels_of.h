@@ -20,13 +20,11 @@ static inline vsh_charts *create(const vsh_mesh *meshes, size_t count, vsh_light
     return charts;
 }
 
-static inline vsh_texels *rasterize(const vsh_charts *charts) {
-    vsh_texels *texels = NULL;
-    assert_ok(vsh_texels_create(charts, NULL, &texels, &failure));
+static inline vshi_texels *rasterize(const vsh_charts *charts) {
+    vshi_texels *texels = NULL;
+    assert_ok(vshi_texels_create(charts, NULL, &texels, &failure));
     return texels;
 }
-
-static const uint32_t QUAD_INDICES[6] = {0, 1, 2, 0, 2, 3};
 
 /* A quad in the plane z = 0 at x = 2 u, y = 3 v, facing +z. */
 typedef struct quad {
@@ -43,12 +41,7 @@ static inline void make_quad(quad *q, float u0, float v0, float u1, float v1) {
         q->positions[3 * k + 1] = 3.0f * corner[k][1];
         q->positions[3 * k + 2] = 0.0f;
     }
-    q->mesh = (vsh_mesh){.name = "quad",
-                         .positions = q->positions,
-                         .uvs = q->uvs,
-                         .indices = QUAD_INDICES,
-                         .vertex_count = 4,
-                         .triangle_count = 2};
+    q->mesh = quad_mesh("quad", q->positions, q->uvs);
 }
 
 /* A UV sphere with smooth normals and its own chart; `rows` × 2 rows segments. */

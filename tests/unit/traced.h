@@ -9,12 +9,12 @@
 
 typedef struct caster {
     vsh_field *field;
-    vsh_triangles *triangles;
+    vshi_triangles *triangles;
 } casting;
 
 #define occluders_of_caster(c) occluders_traced((c)->field, (c)->triangles)
 
-/* Numbers of methods that can be asked for. */
+/* Numbers of methods. */
 enum { SHADOW_METHODS = VSH_SHADOW_EXACT + 1, AO_METHODS = VSH_AO_EXACT + 1 };
 
 /* A solid's surface: SOLID_SECTORS columns of SOLID_RINGS + 1 places. Its chords are within 3e-4 of a radius.
@@ -46,46 +46,32 @@ static inline void solid_vertex(const truth_solid *solid, int sector, int ring, 
     }
 }
 
-static inline void add_face(uint32_t *indices, size_t *count, uint32_t a, uint32_t b, uint32_t c) {
-    const uint32_t corners[3] = {a, b, c};
-    memcpy(indices + 3 * *count, corners, sizeof corners);
-    ++*count;
-}
-
 /* The solid around its centre; arrays are the caller's to free. */
 static inline vsh_mesh mesh_of_solid(const truth_solid *solid) {
     float *positions = malloc(3 * SOLID_VERTICES * sizeof *positions);
     uint32_t *indices = malloc(6 * (size_t)SOLID_RINGS * SOLID_SECTORS * sizeof *indices);
-    assert_non_null(positions);
-    assert_non_null(indices);
     size_t triangles = 0, vertices = 0;
     if (solid->shape == TRUTH_BOX && !(solid->radius > 0.0)) {
-        static const uint32_t SIDES[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6},
-                                              {0, 1, 4}, {1, 5, 4}, {2, 6, 3}, {3, 6, 7},
-                                              {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-        for (; vertices < 8; ++vertices) {
+        const double low[3] = {-solid->half[0], -solid->half[1], -solid->half[2]};
+        vsh_mesh box = box_mesh(positions, low, solid->half);
+        memcpy(indices, box.indices, 36 * sizeof *indices);
+        box.indices = indices;
+        return box;
+    }
+    for (int sector = 0; sector < SOLID_SECTORS; ++sector) {
+        for (int ring = 0; ring <= SOLID_RINGS; ++ring, ++vertices) {
+            double p[3];
+            solid_vertex(solid, sector, ring, p);
             for (size_t axis = 0; axis < 3; ++axis) {
-                positions[3 * vertices + axis] =
-                    (float)((vertices >> axis & 1) != 0 ? solid->half[axis] : -solid->half[axis]);
+                positions[3 * vertices + axis] = (float)p[axis];
             }
-        }
-        memcpy(indices, SIDES, sizeof SIDES);
-        triangles = 12;
-    } else {
-        for (int sector = 0; sector < SOLID_SECTORS; ++sector) {
-            for (int ring = 0; ring <= SOLID_RINGS; ++ring, ++vertices) {
-                double p[3];
-                solid_vertex(solid, sector, ring, p);
-                for (size_t axis = 0; axis < 3; ++axis) {
-                    positions[3 * vertices + axis] = (float)p[axis];
-                }
-                if (ring < SOLID_RINGS) {
-                    const uint32_t at = (uint32_t)vertices;
-                    const uint32_t next =
-                        (uint32_t)((sector + 1) % SOLID_SECTORS) * (SOLID_RINGS + 1) + (uint32_t)ring;
-                    add_face(indices, &triangles, at, at + 1, next + 1);
-                    add_face(indices, &triangles, at, next + 1, next);
-                }
+            if (ring < SOLID_RINGS) {
+                const uint32_t at = (uint32_t)vertices;
+                const uint32_t next =
+                    (uint32_t)((sector + 1) % SOLID_SECTORS) * (SOLID_RINGS + 1) + (uint32_t)ring;
+                const uint32_t both[6] = {at, at + 1, next + 1, at, next + 1, next};
+                memcpy(indices + 3 * triangles, both, sizeof both);
+                triangles += 2;
             }
         }
     }
@@ -94,10 +80,10 @@ static inline vsh_mesh mesh_of_solid(const truth_solid *solid) {
 }
 
 /* The scene's triangles moved by `offset`, then scaled. */
-static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale, const double offset[3]) {
+static inline vshi_triangles *triangles_of_moved(truth_scene scene, double scale, const double offset[3]) {
     vsh_mesh meshes[MAX_SOLIDS] = {{0}};
     double transforms[MAX_SOLIDS][12];
-    vsh_triangles *triangles = NULL;
+    vshi_triangles *triangles = NULL;
     for (size_t i = 0; i < scene.count; ++i) {
         meshes[i] = mesh_of_solid(&scene.solids[i]);
         memset(transforms[i], 0, sizeof transforms[i]);
@@ -107,7 +93,7 @@ static inline vsh_triangles *triangles_of_moved(truth_scene scene, double scale,
         }
         meshes[i].transform = transforms[i];
     }
-    assert_ok(vsh_triangles_create(meshes, scene.count, NULL, &triangles, &failure));
+    assert_ok(vshi_triangles_create(meshes, scene.count, NULL, &triangles, &failure));
     for (size_t i = 0; i < scene.count; ++i) {
         free((void *)(uintptr_t)meshes[i].positions);
         free((void *)(uintptr_t)meshes[i].indices);
@@ -127,8 +113,8 @@ static inline casting caster_of(truth_scene scene, double voxel, double reach) {
 }
 
 static inline void caster_free(casting *c) {
-    vsh_triangles_free(c->triangles);
-    vsh_field_free(c->field);
+    vshi_triangles_free(c->triangles);
+    vshi_field_free(c->field);
 }
 
 static inline vsh_shade_stats cast_shadows(const casting *c, const vsh_light *light, int32_t method,
@@ -150,10 +136,7 @@ static inline vsh_shade_stats cast_ao(const casting *c, int32_t method, double d
     options.ao_method = method;
     options.ao_distance = distance;
     const vsh_points points = {count, positions, normals, NULL};
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    assert_ok(
-        vsh_shade_ao(occluders_of_caster(c), &points, &options, NULL, open, NULL, NULL, &stats, &failure));
-    return stats;
+    return shade_ao_points(occluders_of_caster(c), &points, &options, NULL, open);
 }
 
 static inline float cast_ao_at(const casting *c, int32_t method, double distance, const double *position,
@@ -161,6 +144,48 @@ static inline float cast_ao_at(const casting *c, int32_t method, double distance
     float open = -1.0f;
     cast_ao(c, method, distance, 1, position, normal, &open);
     return open;
+}
+
+/* --- shadows and AO by every method, one kind of value after the other */
+
+/* Shadow methods by their numbers, then those of AO. */
+enum { KINDS = SHADOW_METHODS + AO_METHODS };
+
+static inline bool is_ao(int kind) {
+    return kind >= SHADOW_METHODS;
+}
+
+static inline const char *name_of(int kind) {
+    static char name[32];
+    snprintf(name, sizeof name, "%s %s", is_ao(kind) ? "AO" : "shadow",
+             is_ao(kind) ? vsh_get_name(VSH_NAMES_AO, kind - SHADOW_METHODS)
+                         : vsh_get_name(VSH_NAMES_SHADOW, kind));
+    return name;
+}
+
+static inline vsh_shade_stats cast_kind(const casting *c, int kind, const vsh_light *light,
+                                        double ao_distance, size_t count, const double *at,
+                                        const float *facing, float *values) {
+    return is_ao(kind) ? cast_ao(c, kind - SHADOW_METHODS, ao_distance, count, at, facing, values)
+                       : cast_shadows(c, light, kind, count, at, facing, values);
+}
+
+static inline float cast_kind_at(const casting *c, int kind, const vsh_light *light, double ao_distance,
+                                 const double *at, const float *facing) {
+    float value = -1.0f;
+    cast_kind(c, kind, light, ao_distance, 1, at, facing, &value);
+    return value;
+}
+
+/* With options of the test's own, but for the method. */
+static inline void shade_kind(const casting *c, int kind, const vsh_light *light, vsh_shade_options options,
+                              const vsh_points *points, float *values) {
+    *(is_ao(kind) ? &options.ao_method : &options.method) = is_ao(kind) ? kind - SHADOW_METHODS : kind;
+    if (is_ao(kind)) {
+        shade_ao_points(occluders_of_caster(c), points, &options, NULL, values);
+    } else {
+        shade_points(occluders_of_caster(c), points, light, &options, NULL, values, NULL);
+    }
 }
 
 #endif

@@ -5,7 +5,7 @@
 #include "shading.h"
 #include "testing.h"
 
-#include <vdbshade/query.h>
+#include <vdbshade/light.h>
 
 static inline vsh_voxels *box_of(const double low[3], const double high[3], double voxel) {
     vsh_voxels *voxels = NULL;
@@ -32,12 +32,21 @@ static inline vsh_volume *bake(const vsh_occluders *occluders, const vsh_voxels 
     return volume;
 }
 
-/* A grid's values over the voxels' box, x fastest. */
+/* A grid's values over the voxels' box, x fastest, and the centres of its voxels, [count][3]. */
 typedef struct dense {
     int32_t low[3], size[3];
     size_t count;
     float *values;
+    double *centre;
 } dense;
+
+/* Index of the i-th value. */
+static inline void index_of(const dense *d, size_t i, int32_t index[3]) {
+    const size_t row = (size_t)d->size[0], plane = row * (size_t)d->size[1];
+    index[0] = d->low[0] + (int32_t)(i % row);
+    index[1] = d->low[1] + (int32_t)(i % plane / row);
+    index[2] = d->low[2] + (int32_t)(i / plane);
+}
 
 static inline dense copy_of(const vsh_volume *volume, size_t grid, const vsh_voxels *voxels) {
     vsh_voxels_info info;
@@ -49,38 +58,23 @@ static inline dense copy_of(const vsh_volume *volume, size_t grid, const vsh_vox
         d.count *= (size_t)d.size[axis];
     }
     d.values = malloc(d.count * sizeof *d.values);
-    assert_non_null(d.values);
-    assert_int_equal(vsh_volume_copy(volume, grid, d.low, d.size, d.values, NULL), VSH_OK);
+    d.centre = malloc(3 * d.count * sizeof *d.centre);
+    assert_ok(vsh_volume_copy(volume, grid, d.low, d.size, d.values, &failure));
+    for (size_t i = 0; i < d.count; ++i) {
+        int32_t index[3];
+        index_of(&d, i, index);
+        vshi_voxels_centre(voxels, index, d.centre + 3 * i);
+    }
     return d;
 }
 
 static inline void free_dense(dense *d) {
     free(d->values);
-}
-
-/* Index of the i-th value. */
-static inline void index_of(const dense *d, size_t i, int32_t index[3]) {
-    const size_t row = (size_t)d->size[0], plane = row * (size_t)d->size[1];
-    index[0] = d->low[0] + (int32_t)(i % row);
-    index[1] = d->low[1] + (int32_t)(i % plane / row);
-    index[2] = d->low[2] + (int32_t)(i / plane);
-}
-
-/* The centres of all of them, [count][3]; to be freed. */
-static inline double *centres_of(const dense *d, const vsh_voxels *voxels) {
-    double *centres = malloc(3 * d->count * sizeof *centres);
-    assert_non_null(centres);
-    for (size_t i = 0; i < d->count; ++i) {
-        int32_t index[3];
-        index_of(d, i, index);
-        vsh_voxels_centre(voxels, index, centres + 3 * i);
-    }
-    return centres;
+    free(d->centre);
 }
 
 static inline float *distances_of(const vsh_field *field, size_t count, const double *positions) {
     float *distances = malloc(count * sizeof *distances);
-    assert_non_null(distances);
     vsh_field_sample(field, count, positions, distances);
     return distances;
 }

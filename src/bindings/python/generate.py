@@ -1,8 +1,7 @@
-"""Writes what `import vdbshade` has of the public headers: generate.py INCLUDE_FOLDER OUTPUT_FOLDER
+"""Generates modules for `import vdbshade` from the public headers: generate.py INCLUDE_FOLDER BINDINGS_H OUTPUT_FOLDER
 
-_abi.py: the declarations as cffi keeps them, so that nothing is parsed when the module is imported;
-_tables.py: words for constants; types.py: what options there are and what is told of things, with the headers'
-comments."""
+_abi.py: declarations, also those of bindings.h, compiled by cffi, so that importing parses nothing; _tables.py: words for constants; types.py: options and
+records, with the headers' comments."""
 import contextlib
 import keyword
 import pathlib
@@ -11,33 +10,134 @@ import sys
 import textwrap
 
 import cffi
-import headers
 
-# Members that are a library's own business, or that arguments of another name stand for.
-HIDDEN = {"struct_size", "user", "checked", "sink", "done", "writing", "look"}
-# Members that arguments of their own stand for.
+# Members for the library's own use, or replaced by arguments of other names.
+HIDDEN = {"struct_size", "user", "checked", "done", "look"}
+# Members replaced by arguments of their own.
 ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, "vsh_compare_files_options": {"limits"},
-             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"},
-             "vsh_layer": {"field", "heights", "spheres", "triangles", "lights", "light_count"}}
+             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"}}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 
-# What a member is where its comment does not begin with the constants' name.
+# Prefixes of members whose comments do not name one.
 MORE_WORDS = {("vsh_lightmap_options", "padding"): "VSH_PADDING_", ("vsh_receiver", "padding"): "VSH_PADDING_",
               ("vsh_planes", "sky"): "VSH_UP_", ("vsh_run", "isa"): "VSH_ISA_", ("vsh_receiver", "seams"): "VSH_SEAMS_",
               ("vsh_receiver", "type"): "VSH_RECEIVER_", ("vsh_receiver", "unwrap"): "VSH_RECEIVER_UNWRAP_",
               ("vsh_lit_image", "purpose"): "VSH_LIT_", ("vsh_unwrap_options", "keep_uvs"): "VSH_UNWRAP_"}
-# Words of functions' arguments, and constants that are none.
+# Prefixes of functions' arguments, and constants that are no words.
 OTHER_WORDS = ["VSH_ERROR_", "VSH_MEASURE_", "VSH_CONFINED_", "VSH_HEIGHTS_", "VSH_CHANNEL_", "VSH_METHOD_", "VSH_BENT_"]
 COUNTS = {"VSH_MEASURE_COUNT", "VSH_LIT_PURPOSES", "VSH_CONFINED_ALL", "VSH_OK"}
 # Structs without a size that are filled by keywords.
 FILLED = {"vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes",
           "vsh_selection"}
 
+# --- the headers
+
+COMMENT = re.compile(r"/\*.*?\*/", re.S)
+OF_CPP = re.compile(r"^#if defined\(__cplusplus\) && .*?^#endif\n", re.S | re.M)
+
+
+class Member:
+    """A member of a struct: its name, its C type without the name, lengths of arrays, and its comment."""
+
+    def __init__(self, name, type, lengths, comment):
+        self.name, self.type, self.lengths, self.comment = name, type, lengths, comment
+
+
+def read_headers(folder):
+    """All headers that vdbshade.h includes, in the order in which they may be compiled, as one text without the parts for C++."""
+    texts, done = [], set()
+
+    def add(name):
+        if name in done:
+            return
+        done.add(name)
+        text = OF_CPP.sub("", (folder / name).read_text(encoding="utf-8"))
+        for other in re.findall(r'^#include "(\w+\.h)"', text, re.M):
+            add(other)
+        texts.append(text)
+
+    add("vdbshade.h")
+    return "\n".join(texts)
+
+
+def _inline_removed(text):
+    """Removes functions that are defined in the headers: a loaded library does not have them."""
+    result, at = [], 0
+    for start in re.finditer(r"^static inline ", text, re.M):
+        if start.start() < at:
+            continue
+        result.append(text[at : start.start()])
+        at = text.index("\n}\n", start.start()) + 3
+    return "".join(result) + text[at:]
+
+
+def declarations(text):
+    """Declarations for cffi: no comments, no directives, no inline functions."""
+    text = COMMENT.sub(" ", text)
+    text = re.sub(r"^#.*(?:\\\n.*)*$", "", text, flags=re.M)
+    text = re.sub(r'extern "C" \{', "", text)
+    text = _inline_removed(text).replace("VSH_API ", "").replace("VSHI_SHARED ", "")
+    text = re.sub(r"^\}\s*$", "", text, flags=re.M)  # of extern "C"
+    return re.sub(r"\n\s*\n+", "\n", text).strip() + "\n"
+
+
+def functions(text):
+    """Names of the functions that the library exports, in the order of the headers."""
+    return list(dict.fromkeys(re.findall(r"VSH_API[^;{]*?\b(vsh_\w+)\(", COMMENT.sub(" ", text))))
+
+
+def enumerations(text):
+    """Each enum of the headers: its constants by their names, and the numbers that they stand for."""
+    constants, blocks = {}, []
+    for body in re.findall(r"^enum \{(.*?)\};", COMMENT.sub(" ", text), re.S | re.M):
+        number, block = -1, {}
+        for entry in filter(None, (part.strip() for part in body.split(","))):
+            name, _, given = entry.partition("=")
+            number = eval(given.strip(), {}, constants) if given.strip() else number + 1  # our own headers' numbers
+            block[name.strip()] = number
+            constants.update(block)
+        blocks.append(block)
+    return blocks
+
+
+def _words(comment):
+    """A comment as one line."""
+    return " ".join(re.sub(r"^\s*\* ?", " ", line) for line in comment.strip("/*").split("\n")).split()
+
+
+def structs(text):
+    """{name: [Member, …]} of every struct with declared members."""
+    found = {}
+    for match in re.finditer(r"^typedef struct (\w+) \{\n(.*?)^\} \1;", text, re.S | re.M):
+        members = []
+        body = re.sub(r"\(\*(\w+)\)\(.*?\);", r"\1_callback \1;", match[2], flags=re.S)
+        for part in re.finditer(r"(?P<declared>[a-z_][^;/]*);|(?P<comment>/\*.*?\*/)", body, re.S):
+            if part["comment"]:
+                if members and not members[-1].comment:
+                    members[-1].comment = " ".join(_words(part["comment"]))
+                continue
+            kind = ""
+            for name in part["declared"].split(","):
+                first = re.match(r"(.*?)(\w+)((?:\[\w+\])*)$", name.strip(), re.S)
+                kind = " ".join(first[1].split()) or kind
+                members.append(Member(first[2], kind, re.findall(r"\w+", first[3]), ""))
+        found[match[1]] = members
+    return found
+
+
+# --- the modules
+
 
 def words_of(text):
-    """{(struct, member): prefix} of members that are given as words."""
-    found = {**headers.words_of_members(text), **MORE_WORDS}
-    del found["vsh_flat_caster", "type"]  # of a file alone; an enum of the same prefix is the methods
+    """{(struct, member): prefix} of members that are given as words: those with VSH_PREFIX_… in their comments, and MORE_WORDS."""
+    found = {}
+    for struct, members in structs(text).items():
+        for member in members:
+            match = re.search(r"(VSH_[A-Z_]+_)…(?! \+)", member.comment)
+            if match and member.type == "int32_t" and "bits" not in member.comment:
+                found[struct, member.name] = match[1]
+    found.update(MORE_WORDS)
+    del found["vsh_flat_caster", "type"]  # only in files; the enum of this prefix has methods
     return found
 
 
@@ -46,7 +146,7 @@ def camel(struct):
 
 
 def hint(member, words, known):
-    """The type of a member as Python has it."""
+    """The Python type of a member."""
     if words:
         return "Union[str, int]"
     if member.type in ("const char *", "char"):
@@ -58,7 +158,7 @@ def hint(member, words, known):
     return NUMBERS.get(member.type, "Any")
 
 
-RECORD = '''"""Made from the public headers when vdbshade is built: what options there are, and what is told of things."""
+RECORD = '''"""Options and records. Made from the public headers when vdbshade is built."""
 from __future__ import annotations
 
 import typing
@@ -66,14 +166,14 @@ from typing import Any, Sequence, Union
 
 
 class Record:
-    """Values that a call tells; the same names as in C."""
+    """Values from a call, by the same names as in C."""
 
     def __init__(self, **values: Any) -> None:
         self.__dict__.update(values)
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items() if name[0] != "_")
-        return f"{type(self).__name__}({told})"
+        values = ", ".join(f"{name}={value!r}" for name, value in self.__dict__.items() if name[0] != "_")
+        return f"{type(self).__name__}({values})"
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and repr(self) == repr(other)
@@ -83,18 +183,18 @@ class Record:
 
 
 def is_options(name, members):
-    """Whether a struct is filled by the caller, member by member: it is a dict of keywords then."""
+    """Whether the caller fills a struct member by member: it is a dict of keywords then."""
     return (members[0].name == "struct_size" and not name.endswith("_stats")) or name in FILLED
 
 
 def write_types(path, text):
-    found, words = headers.structs(text), words_of(text)
+    found, words = structs(text), words_of(text)
     texts = [RECORD]
     for struct, members in found.items():
         base = "typing.TypedDict, total=False" if is_options(struct, members) else "Record"
         shown = [m for m in members if m.name not in HIDDEN | ARGUMENTS.get(struct, set())]
         hints = [hint(m, words.get((struct, m.name)), found) for m in shown]
-        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the headers.', "", "    Attributes", "    ----------"]
+        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the ', "", "    Attributes", "    ----------"]
         for member, kind in zip(shown, hints):
             texts.append(f"    {member.name} : {kind}")
             comment = member.comment.replace("\\", "\\\\").replace('"""', "'''")
@@ -107,7 +207,7 @@ def write_types(path, text):
 
 def table(prefix, text):
     """The words of an enum all of whose constants begin so."""
-    for block in headers.enumerations(text):
+    for block in enumerations(text):
         if all(name.startswith(prefix) or name == "VSH_OK" for name in block):
             return {name[len(prefix) :].lower(): number for name, number in block.items() if name not in COUNTS}
     raise SystemExit(f"generate.py: no enum of constants {prefix}…")
@@ -122,12 +222,12 @@ def write_tables(path, text):
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def main(include, output):
-    text = headers.read(pathlib.Path(include) / "vdbshade")
+def main(include, bindings, output):
+    text = read_headers(pathlib.Path(include) / "vdbshade")
     output = pathlib.Path(output)
     output.mkdir(parents=True, exist_ok=True)
     ffi = cffi.FFI()
-    ffi.cdef(headers.declarations(text))
+    ffi.cdef(declarations(text + pathlib.Path(bindings).read_text(encoding="utf-8")))
     ffi.set_source("vdbshade._abi", None)
     with contextlib.redirect_stdout(None):
         ffi.emit_python_code(str(output / "_abi.py"))

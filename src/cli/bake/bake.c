@@ -1,106 +1,196 @@
 /* vdbshade bake: from files to lightmaps. */
-#include "base/bytes.h"
-#include "cli/message.h"
-#include "cli/paths.h"
-#include "cli/progress.h"
-#include "cli/signals.h"
-#include "cli/stats.h"
-#include "cli/temporary.h"
-#include "cli/warnings.h"
-#include "options.h"
+#include "bake.h"
 
-#include <inttypes.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+/* --- options */
 
-/* What is only for outputs that are assets. */
-static int check_lit(const cli_bake_settings *settings, const vsh_scene *scene) {
-    const char *given = settings->preview ? "preview" : settings->exr != NULL ? "exr" : NULL;
+static bool is_length(double value) {
+    return value >= 1e-12 && value <= 1e12;
+}
+
+static int parse_world(void *at, const char *name, const char *value) {
+    double *world = at;
+    const bool both = strchr(value, ',') != NULL;
+    return cli_read_numbers(value, both ? 2 : 1, world) && is_length(world[0]) &&
+                   (!both || is_length(world[1]))
+               ? CLI_OK
+               : cli_usage("%s '%s': expected W or W,D, each from 1e-12 to 1e12", name, value);
+}
+
+int cli_parse_floor(void *at, const char *name, const char *value) {
+    double *floor = at;
+    const bool good =
+        cli_read_numbers(value, 5, floor) || cli_read_numbers(value, 2, memset(floor, 0, 5 * sizeof *floor));
+    return good && floor[0] > 0.0 && floor[0] <= 1e12 && floor[1] > 0.0 && floor[1] <= 1e12
+               ? CLI_OK
+               : cli_usage("%s '%s': expected W,D or W,D,X,Y,Z: sizes along x and z, above 0, and the middle",
+                           name, value);
+}
+
+static int parse_shard(void *at, const char *name, const char *value) {
+    enum { MOST = 10000 };
+    int32_t *shard = at;
+    const char *rest;
+    const bool good = cli_read_integer(value, &shard[0], &rest) && *rest == '/' &&
+                      cli_read_integer(rest + 1, &shard[1], &rest) && *rest == '\0';
+    return good && shard[0] >= 1 && shard[0] <= shard[1] && shard[1] <= MOST
+               ? CLI_OK
+               : cli_usage(
+                     "%s '%s': expected I/N, the number of the part and how many there are, at most %d; "
+                     "1/3, for example",
+                     name, value, MOST);
+}
+
+static const cli_option options[] = {
+    {.help = "Most used"},
+    {"output", "OUT",
+     "image to write: .exr with named channels, or .png .tif .dpx .jp2 .tga .bmp .hdr .ppm .pgm .jpg .webp "
+     ".gif; what each can hold, and what is not written: docs/formats.md; .glb .gltf .obj: the input with "
+     "its "
+     "light in its materials (docs/lit.md)",
+     CLI_VALUE(TEXT, cli_bake_settings, output)},
+    CLI_SUN_OPTIONS,
+    {"ao", CLI_SETTING},
+    {"irradiance", CLI_SETTING},
+    {"size", CLI_SETTING},
+    {"unwrap", CLI_SETTING},
+    {"per-object", NULL,
+     "an image for each object: FOLDER/NAME.exr with -o FOLDER/, else OUT.NAME.exr, or where OUT has %s",
+     CLI_VALUE(FLAG, cli_bake_settings, per_object)},
+    {"max-error", CLI_SETTING},
+    {"view", "PAGE.html", "also a page that shows the bake in a browser: docs/view.md",
+     CLI_VALUE(TEXT, cli_bake_settings, view)},
+    {"dry-run", NULL, "bake nothing: print texels, voxels and memory",
+     CLI_VALUE(FLAG, cli_bake_settings, dry_run)},
+    {.help = "Output"},
+    {"output-folder", "FOLDER",
+     "write the outputs that a scene's file names there, under the same names; the folder is made",
+     CLI_VALUE(TEXT, cli_bake_settings, output_folder)},
+    {CLI_SETTINGS(VSH_SETTINGS_IMAGE)},
+    {"preview", NULL,
+     "into a .glb or .gltf: the light as unlit base colour, which every viewer shows, instead of textures",
+     CLI_VALUE(FLAG, cli_bake_settings, preview)},
+    {"exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf",
+     CLI_VALUE(TEXT, cli_bake_settings, exr)},
+    {"invalid", "FILE.png",
+     "also a picture of the lightmap: charts grey, texels inside solids or behind walls red; FILE.OUT.png if "
+     "there are several outputs",
+     CLI_VALUE(TEXT, cli_bake_settings, invalid_picture)},
+    CLI_STATS_OPTION(cli_bake_settings, stats),
+    {"shard", "I/N",
+     "bake part I of N into OUT.I-of-N.part: on any machine, in any order, again where it failed; 'vdbshade "
+     "merge OUT' joins all parts to the bits of one bake",
+     CLI_PARSED(cli_bake_settings, shard, parse_shard)},
+    {.help = "Light and occlusion"},
+    CLI_LAMP_OPTIONS,
+    {CLI_SETTINGS(VSH_SETTINGS_CHANNELS)},
+    CLI_ACCURACY_OPTIONS,
+    {.help = "Objects"},
+    {"receive", "NAME",
+     "only objects of this name receive, all cast; * and ? match as in a shell; may be repeated",
+     CLI_RANGE(LIST, cli_bake_settings, receive, 0, CLI_MOST_ITEMS)},
+    {"no-receive", "NAME",
+     "objects of this name only cast, or if there are none, those of materials of this name; may be repeated",
+     CLI_RANGE(LIST, cli_bake_settings, no_receive, 0, CLI_MOST_ITEMS)},
+    {"no-cast", "NAME",
+     "objects of this name only receive, or if there are none, those of materials; may be repeated",
+     CLI_RANGE(LIST, cli_bake_settings, no_cast, 0, CLI_MOST_ITEMS)},
+    CLI_FLOOR_OPTION,
+    {.help = "Terrain"},
+    {"height", "H", "height of white in INPUT, an image of heights; scene units",
+     CLI_RANGE(NUMBER, cli_bake_settings, height, -1e12, 1e12)},
+    {"size-world", "W[,D]", "length of its longer side, or of both: along x, then along z; scene units",
+     CLI_PARSED(cli_bake_settings, world, parse_world)},
+    CLI_CASTER_OPTIONS,
+    CLI_GRID_OPTIONS,
+    {.help = "Texels"},
+    {CLI_SETTINGS(VSH_SETTINGS_TEXELS)},
+    {"density", "PATTERN=X",
+     "factor of --texels-per-unit, or of the density that fits, for objects of that name; repeatable, the "
+     "last matching pattern wins (1)",
+     CLI_PARSED(cli_bake_settings, densities, cli_parse_density)},
+    CLI_COMMON_OPTIONS,
+};
+
+int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings) {
+    *settings = (cli_bake_settings){.words = (const char *const *)argv, .word_count = (size_t)argc};
+    return cli_parse(&cli_bake, argc, argv, settings, &settings->input);
+}
+
+static int bake_main(int argc, char **argv) {
+    cli_bake_settings settings;
+    CLI_TRY(cli_bake_parse(argc, argv, &settings));
+    return cli_bake_by(&settings);
+}
+
+const cli_command cli_bake = {
+    "bake", "INPUT -o OUT [options]", "lightmap of a mesh or a scene (.json)",
+    "Bakes soft shadows and ambient occlusion into a lightmap. INPUT is a mesh file with lightmap UVs\n"
+    "(OBJ, glTF, GLB, PLY, FBX …), which casts and receives, an image of heights (with --height), or a\n"
+    "scene file (.json), whose values the options override. Numbers in brackets are defaults.",
+    CLI_ENDING(options, bake_main)};
+
+/* --- checks before anything is read */
+
+/* Refuses options that are for other kinds of outputs. */
+static int check_kinds(const cli_bake_settings *s, const vsh_scene *scene) {
+    const char *for_assets = s->preview ? "preview" : s->exr != NULL ? "exr" : NULL;
+    const char *for_whole = s->invalid_picture != NULL ? "invalid"
+                            : s->view != NULL          ? "view"
+                            : s->exr != NULL           ? "exr"
+                                                       : NULL;
+    CLI_REFUSE_IF(s->shard[0] > 0 && for_whole != NULL,
+                  "--%s: not together with --shard; give it to 'vdbshade merge'", for_whole);
+    CLI_REFUSE_IF(s->merged != NULL && s->output == NULL &&
+                      strcmp(s->merged, scene->receivers[0].output) != 0,
+                  "%s: these are parts of %s, whose first output is %s", s->merged, s->input,
+                  scene->receivers[0].output);
+    CLI_REFUSE_IF(s->invalid_picture != NULL && !cli_has_ending(s->invalid_picture, "png"),
+                  "--invalid '%s': expected a name that ends in .png", s->invalid_picture);
     size_t assets = 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
     }
-    if (given != NULL && assets == 0) {
-        return cli_usage("--%s: is for outputs that end in .glb, .gltf or .obj", given);
-    }
-    if (settings->exr == NULL) {
-        return CLI_OK;
-    }
-    if (!cli_has_ending(settings->exr, "exr") || scene->receiver_count != 1) {
-        return cli_usage("--exr '%s': expected a name that ends in .exr, and one output", settings->exr);
-    }
-    CLI_TRY(cli_check_folder(settings->exr));
-    return cli_bake_check_output(settings, scene, settings->exr);
-}
-
-/* What is not for a part, but for all of them together; and whether what parts say they are of is what is
- * asked for. */
-static int check_shard(const cli_bake_settings *s, const vsh_scene *scene) {
-    const char *given = s->invalid_picture != NULL ? "invalid"
-                        : s->view != NULL          ? "view"
-                        : s->exr != NULL           ? "exr"
-                                                   : NULL;
-    if (s->shard > 0 && given != NULL) {
-        return cli_usage("--%s: not together with --shard; give it to 'vdbshade merge'", given);
-    }
-    if (s->merged != NULL && s->output == NULL && strcmp(s->merged, scene->receivers[0].output) != 0) {
-        return cli_usage("%s: its parts are of %s, whose first output is %s", s->merged, s->input,
-                         scene->receivers[0].output);
-    }
+    CLI_REFUSE_IF(for_assets != NULL && assets == 0, "--%s: is for outputs that end in .glb, .gltf or .obj",
+                  for_assets);
+    CLI_REFUSE_IF(s->exr != NULL && (!cli_has_ending(s->exr, "exr") || scene->receiver_count != 1),
+                  "--exr '%s': expected a name that ends in .exr, and one output", s->exr);
     return CLI_OK;
 }
 
-/* Whether the page of --view can be written. */
-static int check_view(const cli_bake_settings *settings, const vsh_scene *scene) {
-    const char *page = settings->view;
-    if (page == NULL) {
+/* Refuses a page of --view that cannot show the output. */
+static int check_view(const cli_bake_settings *s, const vsh_scene *scene) {
+    const vsh_receiver *receiver = &scene->receivers[0];
+    const bool asset = vsh_lit_is_output(receiver->output);
+    if (s->view == NULL) {
         return CLI_OK;
     }
-    if (!cli_has_ending(page, "html")) {
-        return cli_usage("--view '%s': expected a name that ends in .html", page);
-    }
-    const bool images = settings->per_object && !vsh_lit_is_output(scene->receivers[0].output);
-    if (images || scene->receiver_count != 1 || scene->receivers[0].type != VSH_RECEIVER_MESH) {
-        return cli_usage("--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", page);
-    }
-    const int32_t unwrap = scene->receivers[0].unwrap;
-    if (!vsh_lit_is_output(scene->receivers[0].output) &&
-        (unwrap == VSH_RECEIVER_UNWRAP_AUTO || unwrap == VSH_RECEIVER_UNWRAP_ALWAYS)) {
-        return cli_usage("--view '%s': an image does not hold the UVs that are made; bake a .glb", page);
-    }
-    if (cli_has_ending(scene->receivers[0].output, "obj")) {
-        return cli_usage("--view '%s': shows what a .glb, a .gltf or an image holds, not an .obj", page);
-    }
-    if (cli_same_file(page, scene->receivers[0].output) || cli_same_file(page, settings->input)) {
-        return cli_usage("--view '%s': is also the input or the output", page);
-    }
-    return cli_temporary_check(page);
+    CLI_REFUSE_IF(!cli_has_ending(s->view, "html"), "--view '%s': expected a name that ends in .html",
+                  s->view);
+    CLI_REFUSE_IF((s->per_object && !asset) || scene->receiver_count != 1 ||
+                      receiver->type != VSH_RECEIVER_MESH,
+                  "--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", s->view);
+    CLI_REFUSE_IF(!asset && (receiver->unwrap == VSH_RECEIVER_UNWRAP_AUTO ||
+                             receiver->unwrap == VSH_RECEIVER_UNWRAP_ALWAYS),
+                  "--view '%s': an image does not hold the UVs that are made; bake a .glb", s->view);
+    return cli_has_ending(receiver->output, "obj")
+               ? cli_usage("--view '%s': shows the light of a .glb, a .gltf or an image, not of an .obj",
+                           s->view)
+               : CLI_OK;
 }
 
-/* What can be refused before anything is read. */
-static int check_files(const cli_bake_settings *settings, const vsh_scene *scene) {
-    if (settings->stats != NULL) {
-        CLI_TRY(cli_temporary_check(settings->stats));
-    }
-    CLI_TRY(check_shard(settings, scene));
-    if (settings->invalid_picture != NULL && !cli_has_ending(settings->invalid_picture, "png")) {
-        return cli_usage("--invalid '%s': expected a name that ends in .png", settings->invalid_picture);
-    }
-    CLI_TRY(check_lit(settings, scene));
-    CLI_TRY(check_view(settings, scene));
-    const bool makes = settings->output_folder != NULL || settings->per_object;
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
+static int check_files(const cli_bake_settings *s, const vsh_scene *scene) {
+    const char *const others[] = {s->stats, s->exr, s->view};
+    const bool makes = s->output_folder != NULL || s->per_object;
+    CLI_TRY(check_kinds(s, scene));
+    CLI_TRY(check_view(s, scene));
+    CLI_TRY(cli_check_outputs(others, CLI_COUNT(others), NULL, 0, NULL));
+    for (size_t i = 0; i < scene->receiver_count && !(makes && s->dry_run); ++i) {
         const char *output = scene->receivers[i].output;
-        if (makes && settings->dry_run) {
-            continue; /* its folder need not be there yet */
-        }
         CLI_TRY(makes ? cli_make_folder_of(output) : cli_check_folder(output));
-        vsh_error error;
-        if (vsh_receiver_check(scene, i, &error) != VSH_OK) {
-            return settings->output == NULL && error.code == VSH_ERROR_ARGUMENT
-                       ? cli_usage("%s: receivers[%zu]: output %s", settings->input, i, error.message)
-                       : cli_fail(&error);
+        if (vsh_receiver_check(scene, i, &cli_error) != VSH_OK) {
+            return s->output == NULL && cli_error.code == VSH_ERROR_ARGUMENT
+                       ? cli_usage("%s: receivers[%zu]: output %s", s->input, i, cli_error.message)
+                       : cli_check(cli_error.code);
         }
     }
     return CLI_OK;
@@ -115,27 +205,26 @@ typedef struct baking {
     const vsh_scene *scene;
     const char *parts; /* the name before ".I-of-N.part" */
     size_t count;      /* lightmaps */
-    int code;          /* an exit code of check_outputs() */
+    int code;          /* exit code of check_loaded() */
     bool files_known;  /* their warnings are not printed yet */
 } baking;
 
 /* Checks the outputs again: objects' outputs have their names now, and models their textures. */
-static int check_outputs(const baking *b, const vsh_scene_lightmap *lightmaps) {
+static int check_lightmaps(const baking *b, const vsh_scene_lightmap *lightmaps, size_t count) {
     const cli_bake_settings *s = b->settings;
     const char *const others[] = {s->stats, s->exr, s->view, s->invalid_picture};
-    enum { OTHERS = sizeof others / sizeof others[0] };
-    const char **outputs = calloc(b->count + OTHERS, sizeof *outputs);
-    size_t count = 0;
+    const char **outputs = calloc(count + CLI_COUNT(others), sizeof *outputs);
+    size_t used = 0;
     int code;
-    for (; count < b->count; ++count) {
-        outputs[count] = lightmaps[count].output;
-        CLI_TRY_DONE(cli_bake_check_output(s, b->scene, outputs[count]));
+    for (; used < count; ++used) {
+        outputs[used] = lightmaps[used].output;
+        CLI_TRY_DONE(cli_bake_check_output(s, outputs[used]));
     }
-    for (size_t i = 0; i < OTHERS; ++i) {
-        outputs[count] = others[i];
-        count += others[i] != NULL;
+    for (size_t i = 0; i < CLI_COUNT(others); ++i) {
+        outputs[used] = others[i];
+        used += others[i] != NULL;
     }
-    code = cli_bake_check_inputs(b->scene, outputs, count);
+    code = cli_check(vsh_scene_check_outputs(b->scene, outputs, used, &cli_run, &cli_error));
 done:
     free(outputs);
     return code;
@@ -143,11 +232,11 @@ done:
 
 static vsh_result check_loaded(void *user, const vsh_scene_lightmap *lightmaps, size_t count,
                                vsh_error *error) {
-    (void)error; /* check_outputs() has said why */
     baking *b = user;
+    (void)error; /* check_lightmaps() has printed it */
     b->count = count;
     b->files_known = true;
-    b->code = check_outputs(b, lightmaps);
+    b->code = check_lightmaps(b, lightmaps, count);
     return b->code == CLI_OK ? VSH_OK : VSH_ERROR_CANCELLED;
 }
 
@@ -156,27 +245,46 @@ static int32_t report_progress(void *user, const char *stage, double fraction) {
     baking *b = user;
     if (b->files_known && strcmp(stage, "bake") == 0) {
         b->files_known = false;
-        cli_warnings_tell();
+        cli_print_warnings();
     }
-    return cli_progress_report(NULL, stage, fraction);
+    return cli_report_progress(NULL, stage, fraction);
 }
 
 static bool has_lines(const baking *b) {
-    return b->settings->shard == 0 && (b->count <= MOST_LINES || cli_given.verbose);
+    return b->settings->shard[0] == 0 && (b->count <= MOST_LINES || cli_given.verbose);
 }
 
 static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
     const baking *b = user;
-    if (has_lines(b) && !cli_given.quiet) {
-        cli_say("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output,
-                lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels);
+    if (has_lines(b)) {
+        cli_inform("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output,
+                   lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels);
     }
 }
 
 /* --- reports */
 
-static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *report, int32_t threads) {
-    cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS, threads);
+/* Writes the page of --view. */
+static int write_view(const cli_bake_settings *s, const vsh_receiver *receiver) {
+    vsh_view_bake bake = vsh_view_bake_default();
+    if (s->view == NULL) {
+        return CLI_OK;
+    }
+    if (cli_has_ending(receiver->output, "glb gltf")) {
+        bake.model = receiver->output; /* holds its light */
+    } else {
+        bake.model = receiver->path;
+        bake.planes = (const char *const *)&receiver->output;
+        bake.plane_count = 1;
+        bake.uv_set = receiver->uv_set;
+    }
+    return cli_check_input(vsh_view_write(s->view, &bake, NULL, &cli_run, &cli_error));
+}
+
+static int report_bake(const baking *b, const vsh_bake_report *report) {
+    const cli_bake_settings *s = b->settings;
+    const vsh_scene *scene = b->scene;
+    cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS);
     stats.texels = report->texels;
     stats.invalid_texels = report->invalid_texels;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
@@ -191,45 +299,17 @@ static cli_stats make_stats(const vsh_scene *scene, const vsh_bake_report *repor
     stats.seconds[CLI_STAGE_BAKE] = report->bake_s;
     stats.seconds[CLI_STAGE_WRITE] = report->write_s;
     cli_stats_casters(&stats, scene, &report->occluders);
-    return stats;
-}
-
-/* Writes the page that shows the bake. */
-static int write_view(const cli_bake_settings *settings, const vsh_scene *scene, const vsh_run *run) {
-    const vsh_receiver *receiver = &scene->receivers[0];
-    if (settings->view == NULL) {
-        return CLI_OK;
-    }
-    vsh_view_bake bake = vsh_view_bake_default();
-    if (cli_has_ending(receiver->output, "glb gltf")) {
-        bake.model = receiver->output; /* its light is in it */
-    } else {
-        bake.model = receiver->path;
-        bake.planes = (const char *const *)&receiver->output;
-        bake.plane_count = 1;
-        bake.uv_set = receiver->uv_set;
-    }
-    vsh_error error;
-    return cli_check_result(vsh_view_write(settings->view, &bake, NULL, run, &error), &error);
-}
-
-static int report_bake(const baking *b, const vsh_bake_report *report, const vsh_run *run) {
-    const cli_bake_settings *s = b->settings;
-    const cli_stats stats = make_stats(b->scene, report, run->threads);
-    cli_stats_warn(&stats, b->scene, run);
-    CLI_TRY(write_view(s, b->scene, run));
-    CLI_TRY(cli_stats_finish(&stats, run, s->stats));
-    cli_warnings_tell();
-    if (cli_given.quiet) {
-        return CLI_OK;
-    }
-    if (s->shard > 0) {
-        cli_say("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
-                " of them invalid; 'vdbshade merge %s' once all parts are there",
-                b->parts, s->shard, s->shard_count, report->texels, report->invalid_texels, b->parts);
+    cli_stats_warn(&stats, scene);
+    CLI_TRY(write_view(s, &scene->receivers[0]));
+    CLI_TRY(cli_stats_finish(&stats, s->stats));
+    cli_print_warnings();
+    if (s->shard[0] > 0) {
+        cli_inform("%s.%d-of-%d.part: %" PRIu64 " texels, %" PRIu64
+                   " of them invalid; 'vdbshade merge %s' once all parts are there",
+                   b->parts, s->shard[0], s->shard[1], report->texels, report->invalid_texels, b->parts);
     } else if (!has_lines(b)) {
-        cli_say("%zu lightmaps: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose lists each",
-                b->count, report->texels, report->invalid_texels);
+        cli_inform("%zu lightmaps: %" PRIu64 " texels, %" PRIu64 " of them invalid; --verbose lists each",
+                   b->count, report->texels, report->invalid_texels);
     }
     if (b->count > 0) {
         cli_stats_say(&stats);
@@ -237,30 +317,13 @@ static int report_bake(const baking *b, const vsh_bake_report *report, const vsh
     return CLI_OK;
 }
 
-static int run_bake(const baking *b, const vsh_bake_options *options, const vsh_run *run) {
-    const bool merges = b->settings->merged != NULL;
-    vsh_bake_report report = {.errors = calloc(b->scene->light_count + 2, sizeof *report.errors)};
-    vsh_error error;
-    const vsh_result result =
-        (merges ? vsh_merge_scene : vsh_bake_scene)(b->scene, options, run, &report, &error);
-    const int code = b->code != CLI_OK  ? b->code
-                     : result != VSH_OK ? cli_fail_of(NULL, &error)
-                                        : report_bake(b, &report, run);
-    free(report.errors);
-    return code;
-}
-
-static int print_forecast(const baking *b, const vsh_bake_options *options, const vsh_run *run) {
+static int print_forecast(const baking *b, const vsh_bake_options *how, const vsh_run *run) {
     vsh_bake_forecast f;
-    vsh_error error;
-    const vsh_result result = vsh_forecast_scene(b->scene, options, run, &f, &error);
-    if (b->code != CLI_OK || result != VSH_OK) {
-        return b->code != CLI_OK ? b->code : cli_fail_of(NULL, &error);
-    }
+    const vsh_result result = vsh_forecast_scene(b->scene, how, run, &f, &cli_error);
+    CLI_TRY(b->code != CLI_OK ? b->code : cli_check_input(result));
     cli_stats stats = {.of = CLI_STATS_TEXELS};
-    char methods[128], grid[32], field[32], peak[32];
     cli_stats_methods(&stats, b->scene, f.has_triangles);
-    printf("methods       %s\n", cli_stats_methods_text(&stats, methods, sizeof methods));
+    printf("methods       %s\n", cli_stats_methods_text(&stats));
     printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels, f.lightmap_count,
            f.lightmap_count == 1 ? "" : "s", f.samples);
     if (f.voxels == 0.0) {
@@ -269,38 +332,46 @@ static int print_forecast(const baking *b, const vsh_bake_options *options, cons
         printf("voxels        about %.3g of %.4g, %.4g along the longest side\n", f.voxels, f.voxel_size,
                f.resolution);
     }
-    printf("memory        about %s at most: level set %s, field %s\n",
-           vshi_bytes_text((uint64_t)f.peak_bytes, peak, sizeof peak),
-           vshi_bytes_text((uint64_t)f.grid_bytes, grid, sizeof grid),
-           vshi_bytes_text((uint64_t)f.field_bytes, field, sizeof field));
+    printf("memory        about %s at most: level set %s, field %s\n", cli_bytes_text((uint64_t)f.peak_bytes),
+           cli_bytes_text((uint64_t)f.grid_bytes), cli_bytes_text((uint64_t)f.field_bytes));
     return CLI_OK;
 }
 
-/* Bakes a scene whose options were checked, or merges its parts, or forecasts the bake. */
+/* Bakes a checked scene, merges its parts, or forecasts the bake. */
 static int bake_scene(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
     baking b = {.settings = s, .scene = scene};
-    b.parts = s->merged != NULL ? s->merged : cli_end_path(output, ""); /* it may be a folder, of objects */
-    vsh_run run = cli_make_run();
+    b.parts = s->merged != NULL ? s->merged : cli_end_path(output, ""); /* a folder of objects may be one */
+    vsh_run run = cli_run;
     run.progress = report_progress;
     run.user = &b;
     const char *const files[] = {s->input, cli_bake_lights(s)};
-    vsh_bake_options options = vsh_bake_options_default();
-    options.invalid_picture = s->invalid_picture;
-    options.lit_preview = s->preview;
-    options.lit_exr = s->exr;
-    options.command = cli_parsed_command();
-    options.files = files;
-    options.file_count = s->lights != NULL ? 2 : 1;
-    options.shard = s->dry_run ? 0 : s->shard; /* a forecast is of the whole bake */
-    options.shard_count = s->shard_count;
-    options.parts = b.parts;
-    options.words = s->words;
-    options.word_count = s->word_count;
-    options.loaded = check_loaded;
-    options.done = say_lightmap;
-    options.user = &b;
-    return s->dry_run ? print_forecast(&b, &options, &run) : run_bake(&b, &options, &run);
+    vsh_bake_options o = vsh_bake_options_default();
+    o.invalid_picture = s->invalid_picture;
+    o.lit_preview = s->preview;
+    o.lit_exr = s->exr;
+    o.command = cli_parsed.command;
+    o.files = files;
+    o.file_count = s->lights != NULL ? 2 : 1;
+    o.shard = s->dry_run ? 0 : s->shard[0]; /* a forecast is of the whole bake */
+    o.shard_count = s->shard[1];
+    o.parts = b.parts;
+    o.words = s->words;
+    o.word_count = s->word_count;
+    o.loaded = check_loaded;
+    o.done = say_lightmap;
+    o.user = &b;
+    if (s->dry_run) {
+        return print_forecast(&b, &o, &run);
+    }
+    vsh_bake_report report = {.errors = calloc(scene->light_count + 2, sizeof *report.errors)};
+    const vsh_result result =
+        (s->merged != NULL ? vsh_merge_scene : vsh_bake_scene)(scene, &o, &run, &report, &cli_error);
+    const int code = b.code != CLI_OK   ? b.code
+                     : result == VSH_OK ? report_bake(&b, &report)
+                                        : cli_check_input(result);
+    free(report.errors);
+    return code;
 }
 
 int cli_bake_by(const cli_bake_settings *settings) {

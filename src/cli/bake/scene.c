@@ -1,34 +1,27 @@
-/* From the options of `bake` to the scene it bakes. */
-#include "base/clock.h"
-#include "cli/message.h"
-#include "cli/paths.h"
-#include "cli/temporary.h"
-#include "options.h"
+/* Makes the scene that the options of `bake` describe. */
+#include "bake.h"
 
-#include <stdlib.h>
-#include <string.h>
-#include <sys/stat.h>
+#include <errno.h>
+#include <unistd.h>
 
 /* --- casters */
 
+/* An image of heights needs --height and --size-world, and nothing else takes them. */
 static int check_heights(const cli_bake_settings *s) {
-    const bool given[2] = {s->height != 0.0, s->world[0] > 0.0};
-    const bool wanted = cli_has_ending(
-        s->input, "png exr tif tiff pgm ppm pfm hdr jpg jpeg bmp tga jp2 webp dpx"); /* images of heights */
-    if (!wanted && (given[0] || given[1])) {
-        return cli_usage("--%s: %s is no image of heights, to which it belongs",
-                         given[0] ? "height" : "size-world", s->input);
-    }
-    if (wanted && !(given[0] && given[1])) {
-        return cli_usage("%s: an image is baked as a terrain; give %s%s%s", s->input,
-                         given[0] ? "" : "--height H, the height of white",
-                         given[0] || given[1] ? "" : ", and ",
-                         given[1] ? "" : "--size-world W, the length of its longer side");
-    }
+    static const char *const needs[] = {"--height H, the height of white",
+                                        "--size-world W, the length of its longer side"};
+    const bool height = s->height != 0.0, world = s->world[0] > 0.0;
+    const bool image =
+        cli_has_ending(s->input, "png exr tif tiff pgm ppm pfm hdr jpg jpeg bmp tga jp2 webp dpx");
+    CLI_REFUSE_IF(cli_was_given("height") && !height, "--height '0': a terrain without height casts nothing");
+    CLI_REFUSE_IF(!image && (height || world), "--%s: %s is no image of heights",
+                  height ? "height" : "size-world", s->input);
+    CLI_REFUSE_IF(image && !(height && world), "%s: an image is baked as a terrain; give %s%s%s", s->input,
+                  height ? "" : needs[0], height || world ? "" : ", and ", world ? "" : needs[1]);
     return CLI_OK;
 }
 
-/* A caster of a file, or of a grid in a FILE.vdb. */
+/* Returns the caster of a file, or of a grid in FILE.vdb. */
 static vsh_caster caster_of(const char *path, const char *grid) {
     vsh_caster caster = vsh_caster_default();
     caster.type = cli_has_ending(path, "vdb") ? VSH_CASTER_VDB : VSH_CASTER_MESH;
@@ -37,32 +30,32 @@ static vsh_caster caster_of(const char *path, const char *grid) {
     return caster;
 }
 
-/* The caster that the input is, where it is no scene. */
+/* Returns the caster that the input is, if it is no scene. */
 static vsh_caster caster_of_input(const cli_bake_settings *s) {
-    vsh_caster caster = caster_of(s->input, cli_parsed_grid());
+    vsh_caster caster = caster_of(s->input, cli_parsed.grid);
     if (s->height != 0.0) {
         caster.type = VSH_CASTER_HEIGHTFIELD;
         caster.height = s->height;
         memcpy(caster.size, s->world, sizeof s->world);
     } else {
-        caster.objects = (vsh_selection){NULL, 0, s->no_cast.list, s->no_cast.count};
+        caster.objects = (vsh_selection){NULL, 0, s->no_cast.text, s->no_cast.count};
     }
     return caster;
 }
 
-/* The input's casters, then those of --caster. */
+/* Lists the input's casters, then those of --caster. */
 static void add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     const size_t own = made->read != NULL ? made->read->caster_count : 1;
-    made->casters = calloc(own + s->caster_count, sizeof *made->casters);
+    made->casters = calloc(own + s->casters.count, sizeof *made->casters);
     for (size_t i = 0; i < own; ++i) {
         made->casters[i] = made->read != NULL ? made->read->casters[i] : caster_of_input(s);
     }
-    for (size_t i = 0; i < s->caster_count; ++i) {
-        const char *path = s->casters[i], *grid = cli_split_grid(&path);
+    for (size_t i = 0; i < s->casters.count; ++i) {
+        const char *path = s->casters.text[i], *grid = cli_split_grid(&path);
         made->casters[own + i] = caster_of(path, grid);
     }
     made->scene.casters = made->casters;
-    made->scene.caster_count = own + s->caster_count;
+    made->scene.caster_count = own + s->casters.count;
 }
 
 /* --- receivers */
@@ -70,7 +63,7 @@ static void add_casters(const cli_bake_settings *s, cli_bake_scene *made) {
 static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver) {
     if (s->receive.count > 0 || s->no_receive.count > 0) {
         receiver->objects =
-            (vsh_selection){s->receive.list, s->receive.count, s->no_receive.list, s->no_receive.count};
+            (vsh_selection){s->receive.text, s->receive.count, s->no_receive.text, s->no_receive.count};
     }
     if (s->densities.count > 0) {
         receiver->density = s->densities.list;
@@ -81,22 +74,22 @@ static int override_receiver(const cli_bake_settings *s, vsh_receiver *receiver)
         receiver->atlas = VSH_ATLAS_OBJECTS;
     }
     receiver->output = s->output != NULL ? s->output : receiver->output;
-    return cli_patch_receiver(&s->patch, receiver);
+    return cli_apply_settings(VSH_SETTING_OF_RECEIVER, receiver);
 }
 
-/* The plane of --floor. */
+/* Returns the plane of --floor. */
 static vsh_receiver floor_of(const cli_bake_settings *s) {
     vsh_receiver receiver = vsh_receiver_default();
     receiver.type = VSH_RECEIVER_PLANE;
     receiver.path = "floor";
-    memcpy(receiver.extent, s->floor_size, sizeof receiver.extent);
+    memcpy(receiver.extent, s->floor, sizeof receiver.extent);
     for (int axis = 0; axis < 3; ++axis) {
-        receiver.transform[4 * axis + 3] = s->floor_center[axis];
+        receiver.transform[4 * axis + 3] = s->floor[2 + axis];
     }
     return receiver;
 }
 
-/* The receiver that the input is, where it is no scene. */
+/* Returns the receiver that the input is, if it is no scene. */
 static vsh_receiver receiver_of_input(const cli_bake_settings *s) {
     vsh_receiver receiver = vsh_receiver_default();
     receiver.path = s->input;
@@ -109,15 +102,11 @@ static vsh_receiver receiver_of_input(const cli_bake_settings *s) {
 }
 
 int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
-    const bool floor = s->floor_size[0] > 0.0;
-    if (floor && made->read != NULL && made->read->receiver_count > 0) {
-        return cli_usage("--floor: %s has receivers of its own; put a \"plane\" beside them", s->input);
-    }
+    const bool floor = s->floor[0] > 0.0;
+    CLI_REFUSE_IF(floor && made->read != NULL && made->read->receiver_count > 0,
+                  "--floor: %s has its own receivers; add a \"plane\" to them", s->input);
     const size_t count = made->read != NULL && !floor ? made->read->receiver_count : 1;
-    if (count == 0) {
-        return CLI_OK;
-    }
-    made->receivers = calloc(count, sizeof *made->receivers);
+    made->receivers = calloc(count + 1, sizeof *made->receivers);
     for (size_t i = 0; i < count; ++i) {
         made->receivers[i] = floor                ? floor_of(s)
                              : made->read != NULL ? made->read->receivers[i]
@@ -129,181 +118,108 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
-/* Whether an output is for many objects, of any file. */
+/* What stands for the object's name in an output's path. */
+#define OBJECT_NAME "%s"
+
+/* Whether an output is for many objects: a folder, a path with OBJECT_NAME, or one without an ending. */
 static bool is_of_objects(const char *output) {
     const char *name = cli_file_name(output);
-    return cli_is_folder(output) || strstr(name, CLI_OBJECT_NAME) != NULL || strchr(name, '.') == NULL;
+    return cli_is_folder(output) || strstr(name, OBJECT_NAME) != NULL || strchr(name, '.') == NULL;
 }
 
-/* Puts a receiver's output into the folder of --output-folder, and with --per-object the place of the
- * object's name into it. */
+/* Adds OBJECT_NAME to a path: "out/" and "out" become out/%s.exr, out.png becomes out.%s.png. */
+static const char *add_object_name(const char *output) {
+    const char *name = cli_file_name(output), *dot = strrchr(name, '.');
+    if (strstr(name, OBJECT_NAME) != NULL) {
+        return output;
+    }
+    if (cli_is_folder(output) || dot == NULL || dot == name) {
+        return cli_end_path(output, "/" OBJECT_NAME ".exr");
+    }
+    return cli_keep_text("%.*s.%s%s", (int)(dot - output), output, OBJECT_NAME, dot);
+}
+
+/* Applies --output-folder and --per-object to a receiver's output. */
 static const char *place_output(const cli_bake_settings *s, const char *output) {
     if (s->output_folder != NULL) {
         output = cli_keep_text("%s/%s", s->output_folder, cli_file_name(output));
     }
-    return s->per_object && !vsh_lit_is_output(output) ? cli_object_output(output) : output;
+    return s->per_object && !vsh_lit_is_output(output) ? add_object_name(output) : output;
 }
 
-/* Names are those of one file. */
+/* Names of objects are those of one file. */
 static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made, size_t receivers) {
-    const bool chosen = s->receive.count > 0 || s->no_receive.count > 0;
     const bool one =
         receivers == 1 && (made->read == NULL || made->read->receivers[0].type == VSH_RECEIVER_MESH);
-    if (chosen && !one) {
-        return cli_usage("--%s: %s has no single mesh that receives: what of them does stands in the scene's "
-                         "file, by \"objects\" and \"except\"",
-                         s->receive.count > 0 ? "receive" : "no-receive", s->input);
-    }
-    if (s->no_cast.count > 0 && made->read != NULL) {
-        return cli_usage("--no-cast: the casters of a scene stand in its file, %s; see \"except\"", s->input);
-    }
+    CLI_REFUSE_IF((s->receive.count > 0 || s->no_receive.count > 0) && !one,
+                  "--%s: %s has no single mesh that receives; choose objects in the scene's file, by "
+                  "\"objects\" and \"except\"",
+                  s->receive.count > 0 ? "receive" : "no-receive", s->input);
+    CLI_REFUSE_IF(s->no_cast.count > 0 && made->read != NULL,
+                  "--no-cast: the casters of a scene are in its file, %s; see \"except\"", s->input);
     return CLI_OK;
 }
 
+/* Refuses outputs that do not fit the number or kind of receivers. */
+static int check_receivers(const cli_bake_settings *s, const cli_bake_scene *made, size_t receivers) {
+    CLI_REFUSE_IF(s->output_folder != NULL && (s->output != NULL || made->read == NULL),
+                  "--output-folder '%s': %s", s->output_folder,
+                  s->output != NULL ? "there is also -o" : "for the outputs that a scene names");
+    CLI_REFUSE_IF(receivers > 1 && s->output != NULL && !(s->per_object && is_of_objects(s->output)),
+                  "-o '%s': %s has %zu receivers, each with its own output", s->output, s->input, receivers);
+    CLI_REFUSE_IF(made->read == NULL && cli_has_ending(s->input, "vdb") && s->floor[0] == 0.0,
+                  "%s: a level set has no UVs to bake a lightmap by; give --floor W,D,X,Y,Z for a floor "
+                  "that receives, or bake voxels with 'vdbshade volume'",
+                  s->input);
+    return check_objects(s, made, receivers);
+}
+
 static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
-    const size_t given = made->read != NULL ? made->read->receiver_count : 1;
-    if (s->output_folder != NULL && (s->output != NULL || made->read == NULL)) {
-        return cli_usage("--output-folder '%s': %s", s->output_folder,
-                         s->output != NULL ? "there is also -o" : "for the outputs that a scene names");
-    }
-    const bool many = s->per_object && s->output != NULL && is_of_objects(s->output);
-    if (given > 1 && s->output != NULL && !many) {
-        return cli_usage("-o '%s': %s has %zu receivers, each with its own output", s->output, s->input,
-                         given);
-    }
-    if (made->read == NULL && cli_has_ending(s->input, "vdb") && s->floor_size[0] == 0.0) {
-        return cli_usage(
-            "%s: a level set has no UVs to bake a lightmap by; give --floor W,D,X,Y,Z for a floor that "
-            "receives, or bake voxels with 'vdbshade volume'",
-            s->input);
-    }
-    CLI_TRY(check_objects(s, made, given));
+    CLI_TRY(check_receivers(s, made, made->read != NULL ? made->read->receiver_count : 1));
     CLI_TRY(cli_bake_scene_receivers(s, made));
-    if (made->scene.receiver_count == 0) {
-        return cli_usage("%s: no receivers to bake; name some in \"receivers\", or give --floor W,D,X,Y,Z",
-                         s->input);
-    }
+    CLI_REFUSE_IF(made->scene.receiver_count == 0,
+                  "%s: no receivers to bake; name some in \"receivers\", or give --floor W,D,X,Y,Z",
+                  s->input);
+    /* a folder whose name has an ending is refused later, as an image that cannot be written */
+    CLI_REFUSE_IF(s->output != NULL && !s->per_object && cli_is_folder(s->output) &&
+                      strchr(cli_file_name(s->output), '.') == NULL,
+                  "-o '%s': is a folder; give an image in it, such as '%slightmap.exr', or an image for "
+                  "each object with --per-object",
+                  s->output, cli_end_path(s->output, "/"));
     for (size_t i = 0; i < made->scene.receiver_count; ++i) {
-        if (made->receivers[i].output == NULL) {
-            return cli_usage("%s: no output; give -o OUT", s->input);
-        }
-    }
-    /* a folder with the name of an image is in the way of one */
-    if (s->output != NULL && !s->per_object && cli_is_folder(s->output) &&
-        strchr(cli_file_name(s->output), '.') == NULL) {
-        return cli_usage(
-            "-o '%s': is a folder; give an image in it, as '%s%slightmap.exr', or an image for each "
-            "object with --per-object",
-            s->output, s->output, s->output[strlen(s->output) - 1] == '/' ? "" : "/");
-    }
-    for (size_t i = 0; i < made->scene.receiver_count; ++i) {
+        CLI_REFUSE_IF(made->receivers[i].output == NULL, "%s: no output; give -o OUT", s->input);
         made->receivers[i].output = place_output(s, made->receivers[i].output);
     }
     return CLI_OK;
 }
 
-/* --- checks */
+/* --- lights: those of the scene, a sun, and those of a file */
 
-int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
-    const bool shades = made->scene.ao || vsh_planes_shaded(&made->scene.planes) > 0;
-    if (made->scene.light_count == 0 && !shades) {
-        return cli_usage("%s: nothing to bake%s", s->input,
-                         made->read != NULL ? ": no lights and no ao"
-                                            : "; give --sun X,Y,Z or --ao DISTANCE, or both");
-    }
-    return CLI_OK;
-}
-
-int cli_bake_check_output(const cli_bake_settings *s, const vsh_scene *scene, const char *output) {
-    CLI_TRY(cli_check_apart(output, s->input, "the input"));
-    CLI_TRY(cli_check_apart(output, cli_bake_lights(s), "the file of --lights"));
-    for (size_t i = 0; i < scene->light_file_count; ++i) {
-        CLI_TRY(cli_check_apart(output, scene->light_files[i].path, "also a file of lights"));
-    }
-    const bool named_by_scene = s->output == NULL && s->output_folder == NULL && output != s->stats;
-    CLI_TRY(named_by_scene ? cli_check_links(s->input, output) : CLI_OK);
-    struct stat status;
-    if (stat(output, &status) != 0) {
-        return CLI_OK; /* it replaces nothing */
-    }
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        CLI_TRY(cli_check_apart(output, scene->casters[i].path, "also a caster's file"));
-    }
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        const bool plane = scene->receivers[i].type == VSH_RECEIVER_PLANE;
-        CLI_TRY(cli_check_apart(output, plane ? NULL : scene->receivers[i].path, "also a receiver's file"));
-    }
-    return CLI_OK;
-}
-
-int cli_bake_check_inputs(const vsh_scene *scene, const char *const *outputs, size_t count) {
-    const vsh_run run = cli_make_run();
-    vsh_error error;
-    return cli_check(vsh_scene_check_outputs(scene, outputs, count, &run, &error), &error);
-}
-
-int cli_bake_check_files(const cli_bake_settings *s, const vsh_scene *scene) {
-    const char *const outputs[] = {s->output, s->stats};
-    if (s->output != NULL && s->stats != NULL && cli_same_file(s->output, s->stats)) {
-        return cli_usage("%s: both the output and the --stats file", s->output);
-    }
-    for (size_t i = 0; i < 2; ++i) {
-        if (outputs[i] != NULL) {
-            CLI_TRY(cli_bake_check_output(s, scene, outputs[i]));
-            CLI_TRY(cli_bake_check_inputs(scene, &outputs[i], 1));
-            CLI_TRY(cli_temporary_check(outputs[i]));
-        }
-    }
-    return CLI_OK;
-}
-
-static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        const char *output = scene->receivers[i].output;
-        CLI_TRY(cli_bake_check_output(s, scene, output));
-        if (s->stats != NULL && cli_same_file(output, s->stats)) {
-            return cli_usage("%s: both the output and the --stats file", output);
-        }
-        for (size_t k = 0; k < i; ++k) {
-            const char *other = scene->receivers[k].output;
-            if (!s->per_object && (strcmp(output, other) == 0 || cli_same_file(output, other))) {
-                return cli_usage("%s: the output of two receivers", output);
-            }
-        }
-    }
-    return s->stats != NULL ? cli_bake_check_output(s, scene, s->stats) : CLI_OK;
-}
-
-/* --- lights: a sun, and those that a file has */
-
-static const double sun_angle_default_deg = 0.53; /* of the sun from the earth */
+static const double sun_angle_default_deg = 0.53; /* the sun's diameter, seen from the earth */
 
 const char *cli_bake_lights(const cli_bake_settings *s) {
     return s->lights != NULL && strcmp(s->lights, CLI_LIGHTS_OF_INPUT) == 0 ? s->input : s->lights;
 }
 
 static double sun_angle(const cli_bake_settings *s) {
-    return CLI_DEGREE * (s->has_sun_angle ? s->sun_angle_deg : sun_angle_default_deg);
+    return CLI_DEGREE * (cli_was_given("sun-angle") ? s->sun_angle_deg : sun_angle_default_deg);
 }
 
-/* --unit is over the scene's, which the lights of its files were read by. */
-static int move_lights(const cli_bake_settings *s, const vsh_run *run, cli_bake_scene *made) {
+/* Reads the positions of a scene's light files again: they were read by the scene's unit, and --unit gives
+ * another. */
+static int move_lights(const cli_bake_settings *s, cli_bake_scene *made) {
     for (size_t i = 0; i < made->scene.light_file_count; ++i) {
         const vsh_light_file *file = &made->scene.light_files[i];
         vsh_light *lights = NULL;
         size_t count = 0;
-        vsh_error error;
-        CLI_TRY(cli_check(vsh_lights_read(file->path, file->angle, file->radius, made->scene.unit, run,
-                                          &lights, &count, &error),
-                          &error));
+        CLI_TRY(cli_check(vsh_lights_read(file->path, file->angle, file->radius, made->scene.unit, &cli_run,
+                                          &lights, &count, &cli_error)));
         const bool same = count == file->count;
         for (size_t k = 0; same && k < count; ++k) {
             memcpy(made->lights[file->first + k].position, lights[k].position, sizeof lights[k].position);
         }
         vsh_lights_free(lights);
-        if (!same) {
-            return cli_usage("%s: has other lights than when %s was read", file->path, s->input);
-        }
+        CLI_REFUSE_IF(!same, "%s: its lights changed since %s was read", file->path, s->input);
     }
     return CLI_OK;
 }
@@ -312,69 +228,62 @@ static int move_lights(const cli_bake_settings *s, const vsh_run *run, cli_bake_
 static int join_lights(const cli_bake_settings *s, const vsh_light *others, size_t count,
                        cli_bake_scene *made) {
     const size_t own = made->scene.light_count;
-    vsh_error error;
     made->lights = calloc(own + 1 + count, sizeof *made->lights);
     if (own > 0) {
         memcpy(made->lights, made->scene.lights, own * sizeof *made->lights);
     }
     made->scene.lights = made->lights;
-    if (s->has_sun) {
+    if (cli_was_given("sun")) {
         vsh_light sun = vsh_light_default();
         memcpy(sun.direction, s->sun, sizeof sun.direction);
         sun.angle = sun_angle(s);
-        CLI_TRY(cli_check(vsh_light_check(&sun, &error), &error));
+        CLI_TRY(cli_check(vsh_light_check(&sun, &cli_error)));
         made->lights[made->scene.light_count++] = sun;
     }
     for (size_t i = 0; i < count; ++i) {
         for (size_t k = 0; k < made->scene.light_count; ++k) {
-            if (strcmp(made->lights[k].name, others[i].name) == 0) {
-                return cli_usage("--lights '%s': its light '%s' has the name of %s", s->lights,
-                                 others[i].name, s->has_sun ? "--sun" : "one of the scene's file");
-            }
+            CLI_REFUSE_IF(strcmp(made->lights[k].name, others[i].name) == 0,
+                          "--lights '%s': its light '%s' has the name of %s", s->lights, others[i].name,
+                          cli_was_given("sun") ? "--sun" : "one of the scene's file");
         }
         made->lights[made->scene.light_count++] = others[i];
     }
     return CLI_OK;
 }
 
-static int check_options(const cli_bake_settings *s, const cli_bake_scene *made) {
-    if (s->has_sun && made->read != NULL) {
-        return cli_usage("--sun: the lights of a scene stand in its file, %s", s->input);
-    }
-    if (s->lights != NULL && made->read != NULL && strcmp(s->lights, CLI_LIGHTS_OF_INPUT) == 0) {
-        return cli_usage("--lights '%s': %s is a scene; name the file, or list it there under \"lights\"",
-                         s->lights, s->input);
-    }
-    if (s->has_sun_angle && !s->has_sun && s->lights == NULL) {
-        return cli_usage("--sun-angle: there is no --sun");
-    }
-    return s->has_light_radius && s->lights == NULL ? cli_usage("--light-radius: there is no --lights")
-                                                    : CLI_OK;
+static int check_lights(const cli_bake_settings *s, const cli_bake_scene *made) {
+    CLI_REFUSE_IF(cli_was_given("sun") && made->read != NULL,
+                  "--sun: the lights of a scene are in its file, %s", s->input);
+    CLI_REFUSE_IF(s->lights != NULL && made->read != NULL && strcmp(s->lights, CLI_LIGHTS_OF_INPUT) == 0,
+                  "--lights '%s': %s is a scene; name the file, or list it there under \"lights\"", s->lights,
+                  s->input);
+    CLI_REFUSE_IF(cli_was_given("sun-angle") && !cli_was_given("sun") && s->lights == NULL,
+                  "--sun-angle: there is no --sun");
+    return cli_was_given("light-radius") && s->lights == NULL
+               ? cli_usage("--light-radius: there is no --lights")
+               : CLI_OK;
 }
 
-/* Puts the sun and the lights of a file that the options name behind those of the scene's file. */
+/* Adds the sun and the lights of --lights to those of the scene's file. */
 static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
-    const vsh_run run = cli_make_run();
-    const bool moves = made->scene.light_file_count > 0 && cli_patch_has(&s->patch, "--unit");
+    const bool moves = made->scene.light_file_count > 0 && cli_was_given("unit");
     vsh_light *others = NULL;
     size_t count = 0;
-    vsh_error error;
     int code;
-    CLI_TRY_DONE(check_options(s, made));
+    CLI_TRY_DONE(check_lights(s, made));
     if (s->lights != NULL) {
         CLI_TRY_DONE(cli_check(vsh_lights_read(cli_bake_lights(s), sun_angle(s), s->light_radius,
-                                               made->scene.unit, &run, &others, &count, &error),
-                               &error));
+                                               made->scene.unit, &cli_run, &others, &count, &cli_error)));
+        if (count == 0) {
+            code = cli_usage("--lights '%s': has no lights; only glTF and GLB files have some", s->lights);
+            goto done;
+        }
     }
-    if (s->lights != NULL && count == 0) {
-        code = cli_usage("--lights '%s': has no lights; those of a glTF or GLB are read", s->lights);
-        goto done;
-    }
-    if (s->has_sun || count > 0 || moves) {
+    if (cli_was_given("sun") || count > 0 || moves) {
         CLI_TRY_DONE(join_lights(s, others, count, made));
     }
     if (moves) {
-        CLI_TRY_DONE(move_lights(s, &run, made));
+        CLI_TRY_DONE(move_lights(s, made));
     }
 done:
     vsh_lights_free(others);
@@ -383,11 +292,14 @@ done:
 
 /* --- methods and what they need */
 
-/* Whether a method that the scene is baked by has all of these traits. */
-static bool any_is(const vsh_scene *scene, uint32_t traits) {
+static bool bakes_ao(const vsh_scene *scene) {
+    return scene->ao || scene->planes.sky != VSH_UP_NONE;
+}
+
+/* Whether a method that bakes the scene has all of these traits. */
+static bool any_has(const vsh_scene *scene, uint32_t traits) {
     return (scene->light_count > 0 && (vsh_shadow_method_traits(scene->shade.method) & traits) == traits) ||
-           ((scene->ao || vsh_planes_shaded(&scene->planes) > 0) &&
-            (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
+           (bakes_ao(scene) && (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
 }
 
 static const char *method_of(const vsh_scene *scene) {
@@ -395,70 +307,97 @@ static const char *method_of(const vsh_scene *scene) {
                                   : vsh_get_name(VSH_NAMES_AO, scene->shade.ao_method);
 }
 
-/* Changes methods that keep no error to auto, unless they were named. */
-static int keep_error(const cli_patch *given, vsh_scene *scene) {
+/* Changes methods that keep no error to auto, unless the command line names them. */
+static int keep_error(vsh_scene *scene) {
     vsh_shade_options *shade = &scene->shade;
-    if (!cli_patch_has(given, "--method") &&
-        (vsh_shadow_method_traits(shade->method) & VSH_METHOD_KEEPS_ERROR) == 0) {
+    if (!cli_was_given("method") && (vsh_shadow_method_traits(shade->method) & VSH_METHOD_KEEPS_ERROR) == 0) {
         shade->method = VSH_SHADOW_AUTO;
     }
-    if (!cli_patch_has(given, "--ao-method") &&
+    if (!cli_was_given("ao-method") &&
         (vsh_ao_method_traits(shade->ao_method) & VSH_METHOD_KEEPS_ERROR) == 0) {
         shade->ao_method = VSH_AO_AUTO;
     }
-    return any_is(scene, VSH_METHOD_KEEPS_ERROR)
+    return any_has(scene, VSH_METHOD_KEEPS_ERROR)
                ? CLI_OK
                : cli_usage("--max-error: method %s keeps none; adaptive and exact do", method_of(scene));
 }
 
-/* Whether a scene with its lights, that the options were put over, can be shaded so; sets what follows from
- * them. */
+/* Refuses options that the scene's methods do not use, and sets what follows from the options. */
 static int check_shade(const cli_bake_settings *s, vsh_scene *scene) {
-    const cli_patch *given = &s->patch;
-    if (cli_patch_has(given, "--ao-method") && !scene->ao && vsh_planes_shaded(&scene->planes) == 0) {
-        return cli_usage("--ao-method: there is no --ao");
-    }
-    scene->irradiance = scene->irradiance || cli_patch_has(given, "--ambient");
-    if (scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS)) {
-        return cli_usage("--bent-normals: %s", scene->ao ? "AO by taps knows no directions; use cones or rays"
-                                                         : "there is no --ao");
-    }
-    if (scene->has_ambient && !scene->irradiance) {
-        return cli_usage("%s: ambient is part of irradiance, which is not baked", s->input);
-    }
-    CLI_TRY(cli_patch_has(given, "--max-error") ? keep_error(given, scene) : CLI_OK);
-    const char *option = cli_patch_has(given, "--rays")    ? "--rays"
-                         : cli_patch_has(given, "--error") ? "--error"
-                                                           : NULL;
-    if (option != NULL && !any_is(scene, VSH_METHOD_RAYS)) {
-        return cli_usage("%s: method %s takes no rays; rays, adaptive and exact do", option,
-                         method_of(scene));
-    }
+    CLI_REFUSE_IF(cli_was_given("ao-method") && !bakes_ao(scene), "--ao-method: there is no --ao");
+    scene->irradiance = scene->irradiance || cli_was_given("ambient");
+    CLI_REFUSE_IF(scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS),
+                  "--bent-normals: %s",
+                  scene->ao ? "AO by taps knows no directions; use cones or rays" : "there is no --ao");
+    CLI_REFUSE_IF(scene->has_ambient && !scene->irradiance,
+                  "%s: ambient is part of irradiance, which is not baked", s->input);
+    CLI_TRY(cli_was_given("max-error") ? keep_error(scene) : CLI_OK);
+    CLI_REFUSE_IF((cli_was_given("rays") || cli_was_given("error")) && !any_has(scene, VSH_METHOD_RAYS),
+                  "--%s: method %s takes no rays; rays, adaptive and exact do",
+                  cli_was_given("rays") ? "rays" : "error", method_of(scene));
     return scene->irradiance && scene->light_count == 0 ? cli_usage("--irradiance: there is no light")
                                                         : CLI_OK;
 }
 
+int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {
+    CLI_REFUSE_IF(made->scene.light_count == 0 && !bakes_ao(&made->scene), "%s: nothing to bake%s", s->input,
+                  made->read != NULL ? ": no lights and no ao"
+                                     : "; give --sun X,Y,Z or --ao DISTANCE, or both");
+    return CLI_OK;
+}
+
+/* --- outputs */
+
+int cli_bake_check_output(const cli_bake_settings *s, const char *output) {
+    const char *const inputs[] = {s->input, cli_bake_lights(s)};
+    CLI_TRY(cli_check_apart(&output, 1, inputs, CLI_COUNT(inputs), NULL));
+    return s->output == NULL && s->output_folder == NULL ? cli_check_links(s->input, output) : CLI_OK;
+}
+
+/* Refuses outputs that are an input or each other. Several receivers may share a folder of objects. */
+static int check_outputs(const cli_bake_settings *s, const vsh_scene *scene) {
+    const char *const inputs[] = {s->input, cli_bake_lights(s)};
+    const char **outputs = calloc(scene->receiver_count + 4, sizeof *outputs);
+    size_t count = 0;
+    int code = CLI_OK;
+    for (size_t i = 0; i < scene->receiver_count && code == CLI_OK; ++i) {
+        outputs[count] = scene->receivers[i].output;
+        count += i == 0 || !s->per_object;
+        code = cli_bake_check_output(s, scene->receivers[i].output);
+    }
+    outputs[count++] = s->stats;
+    outputs[count++] = s->exr;
+    outputs[count++] = s->view;
+    outputs[count++] = s->invalid_picture;
+    code = code == CLI_OK ? cli_check_apart(outputs, count, inputs, CLI_COUNT(inputs), NULL) : code;
+    free(outputs);
+    return code;
+}
+
 /* --- all of it */
+
+static int check_input(const char *path) {
+    return access(path, R_OK) == 0 ? CLI_OK
+                                   : cli_refuse(CLI_FILE, "%s: cannot be opened: %s", path, strerror(errno));
+}
 
 int cli_bake_scene_casters(const cli_bake_settings *s, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
     if (cli_has_ending(s->input, "json")) {
-        const vsh_run run = cli_make_run();
-        vsh_error error;
-        CLI_TRY(cli_check(vsh_scene_read(s->input, &run, &made->read, &error), &error));
+        CLI_TRY(cli_check(vsh_scene_read(s->input, &cli_run, &made->read, &cli_error)));
         made->scene = *made->read;
     } else {
-        CLI_TRY(cli_check_input(s->input));
+        CLI_TRY(check_input(s->input));
         made->scene = vsh_scene_default();
         if (cli_has_ending(s->input, "vdb")) {
             made->scene.grid.resolution = 0; /* its own voxels */
         }
     }
     add_casters(s, made);
-    return cli_patch_scene(&s->patch, &made->scene);
+    return cli_apply_settings(VSH_SETTING_OF_SCENE, &made->scene);
 }
 
-int cli_bake_scene_for_points(const cli_bake_settings *s, cli_bake_scene *made) {
+static int make_for_points(const cli_bake_settings *s, cli_bake_scene *made) {
     CLI_TRY(cli_bake_scene_casters(s, made));
     made->scene.receivers = NULL;
     made->scene.receiver_count = 0;
@@ -470,10 +409,10 @@ int cli_bake_scene_make(const cli_bake_settings *s, cli_bake_scene *made) {
     memset(made, 0, sizeof *made);
     CLI_TRY(check_heights(s));
     if (s->output == NULL && !cli_has_ending(s->input, "json")) {
-        CLI_TRY(cli_check_input(s->input));
+        CLI_TRY(check_input(s->input));
         return cli_usage("%s: no output; give -o OUT", s->input);
     }
-    CLI_TRY(cli_bake_scene_for_points(s, made));
+    CLI_TRY(make_for_points(s, made));
     CLI_TRY(cli_bake_check_work(s, made));
     CLI_TRY(add_receivers(s, made));
     return check_outputs(s, &made->scene);
@@ -488,25 +427,20 @@ void cli_bake_scene_free(cli_bake_scene *made) {
 
 /* --- the work of commands that shade points */
 
-cli_shading cli_shading_begin(vsh_scene *scene, int32_t of) {
-    cli_shading shading = {.scene = scene, .run = cli_make_run()};
-    shading.stats = cli_stats_begin(of, shading.run.threads);
-    return shading;
+int cli_shading_begin(cli_shading *shading, const cli_bake_settings *settings, int of) {
+    *shading = (cli_shading){.scene = &shading->made.scene, .stats = cli_stats_begin(of)};
+    return make_for_points(settings, &shading->made);
 }
 
 int cli_shading_load(cli_shading *shading) {
-    const double start = vshi_seconds();
-    vsh_error error;
-    const vsh_result result = vsh_assets_load(shading->scene, &shading->run, &shading->assets, &error);
-    cli_stats_stage(&shading->stats, CLI_STAGE_LOAD, start);
-    return cli_check_result(result, &error);
+    CLI_TRY(cli_check_input(vsh_assets_load(shading->scene, &cli_run, &shading->assets, &cli_error)));
+    cli_stats_lap(&shading->stats, CLI_STAGE_LOAD);
+    return CLI_OK;
 }
 
 int cli_shading_cast(cli_shading *shading, const vsh_scene_occluders_options *what) {
-    vsh_error error;
-    CLI_TRY(cli_check_result(vsh_scene_occluders(shading->scene, shading->assets, what, &shading->run,
-                                                 &shading->occluders, &error),
-                             &error));
+    CLI_TRY(cli_check_input(vsh_scene_occluders(shading->scene, shading->assets, what, &cli_run,
+                                                &shading->occluders, &cli_error)));
     vsh_occluders_info casters;
     vsh_occluders_get_info(shading->occluders, &casters);
     cli_stats_casters(&shading->stats, shading->scene, &casters);
@@ -517,4 +451,5 @@ void cli_shading_free(cli_shading *shading) {
     cli_provenance_free(&shading->origin);
     vsh_occluders_free(shading->occluders);
     vsh_assets_free(shading->assets);
+    cli_bake_scene_free(&shading->made);
 }

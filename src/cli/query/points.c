@@ -1,49 +1,20 @@
 /* Points as rows of files and pipes: read and checked a batch at a time, and written with their answers. */
 #include "points.h"
 #include "base/decimal.h"
-#include "cli/message.h"
-#include "cli/paths.h"
-#include "cli/signals.h"
 
 #include <errno.h>
 #include <float.h>
-#include <inttypes.h>
-#include <math.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/stat.h>
-#include <vdbshade/scene.h>
 
 static const char *const point_names[VSHI_TABLE_COLUMNS] = {"x", "y", "z", "nx", "ny", "nz"};
 
 enum {
-    NX = 3,  /* columns before the normal */
-    SAID = 5 /* bad rows that get a message each */
+    NX = 3,    /* columns before the normal */
+    SHOWN = 5, /* bad rows that get a message each */
+    COUNT_WIDTH = 20
 };
 
-int cli_points_parse_format(const char *option, const char *text, int32_t *format) {
-    static const char *const names[] = {"csv", "ply", "raw"};
-    for (*format = 0; *format < 3; ++*format) {
-        if (strcmp(text, names[*format]) == 0) {
-            return CLI_OK;
-        }
-    }
-    return cli_usage("%s '%s': expected one of csv, ply, raw", option, text);
-}
-
-int32_t cli_points_format_of_path(const char *path) {
-    return cli_has_ending(path, "csv tsv txt xyz") ? VSHI_TABLE_CSV
-           : cli_has_ending(path, "ply")           ? VSHI_TABLE_PLY
-           : cli_has_ending(path, "raw f32 bin")   ? VSHI_TABLE_RAW
-                                                   : -1;
-}
-
 /* --- batches */
-
-size_t cli_points_bytes(bool normals, bool keep) {
-    return 3 * sizeof(double) + (normals ? 3 * sizeof(float) : 0) + sizeof(uint32_t) +
-           (keep ? sizeof(size_t) : 0);
-}
 
 cli_points cli_points_create(size_t room, bool normals, bool keep) {
     return (cli_points){.room = room,
@@ -71,7 +42,7 @@ static void keep_bytes(cli_points *points, const char *bytes, size_t size) {
     points->kept_size += size;
 }
 
-/* Sets row->bad if its values cannot be used. */
+/* Stores in row->bad why its values cannot be used. */
 static void check_row(const cli_points_reader *reader, vshi_table_row *row) {
     bool zero = reader->has_normals;
     for (int i = 0; i < (reader->has_normals ? NX + 3 : NX); ++i) {
@@ -114,35 +85,31 @@ static void add_row(const cli_points_reader *reader, const vshi_table_row *row, 
 /* --- normals of faces */
 
 /* Makes each vertex's normal: the sum of its triangles' normals, weighted by area. */
-static void make_normals(const vsh_mesh *mesh, cli_points_reader *reader) {
+static float *make_normals(const vsh_mesh *mesh) {
     const size_t count = mesh->vertex_count;
-    float *positions = malloc(count * 3 * sizeof *positions), *normals = malloc(count * 3 * sizeof *normals);
+    float *normals = malloc(count * 3 * sizeof *normals);
     double *sums = calloc(count, 3 * sizeof *sums);
     for (size_t t = 0; t < mesh->triangle_count; ++t) {
-        const size_t corner[] = {mesh->indices[3 * t], mesh->indices[3 * t + 1], mesh->indices[3 * t + 2]};
-        const float *p = mesh->positions + 3 * corner[0];
-        double a[3], b[3];
-        for (size_t k = 0; k < 3; ++k) {
-            a[k] = (double)mesh->positions[3 * corner[1] + k] - (double)p[k];
-            b[k] = (double)mesh->positions[3 * corner[2] + k] - (double)p[k];
+        const uint32_t *corner = mesh->indices + 3 * t;
+        const float *p[3];
+        for (size_t i = 0; i < 3; ++i) {
+            p[i] = mesh->positions + 3 * (size_t)corner[i];
         }
         for (size_t i = 0; i < 9; ++i) {
             const size_t k = i % 3, x = (k + 1) % 3, y = (k + 2) % 3;
-            sums[3 * corner[i / 3] + k] += a[x] * b[y] - a[y] * b[x];
+            sums[3 * (size_t)corner[i / 3] + k] +=
+                ((double)p[1][x] - (double)p[0][x]) * ((double)p[2][y] - (double)p[0][y]) -
+                ((double)p[1][y] - (double)p[0][y]) * ((double)p[2][x] - (double)p[0][x]);
         }
     }
     for (size_t v = 0; v < count; ++v) {
         const double *s = sums + 3 * v, length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
         for (size_t k = 0; k < 3; ++k) {
             normals[3 * v + k] = length > 0.0 ? (float)(s[k] / length) : 0.0f;
-            positions[3 * v + k] = mesh->positions[3 * v + k];
         }
     }
     free(sums);
-    reader->face_positions = positions;
-    reader->face_normals = normals;
-    reader->face_vertices = count;
-    reader->has_normals = true;
+    return normals;
 }
 
 static bool has_faces(const vshi_ply_header *ply) {
@@ -155,31 +122,28 @@ static bool has_faces(const vshi_ply_header *ply) {
     return false;
 }
 
-void cli_points_take_faces(const char *path, const vsh_run *run, cli_points_reader *reader,
-                           vsh_error *error) {
-    *error = (vsh_error){VSH_OK, ""};
+void cli_points_read_faces(const char *path, cli_points_reader *reader) {
+    cli_error.message[0] = '\0';
     if (reader->has_normals || !has_faces(&reader->table.ply)) {
         return;
     }
     if (strcmp(path, "-") == 0) {
-        snprintf(error->message, sizeof error->message, "normals of faces need a file, not a pipe");
+        snprintf(cli_error.message, sizeof cli_error.message, "normals of faces need a file, not a pipe");
         return;
     }
-    vsh_model *model = NULL;
-    if (vsh_model_read(path, run, &model, error) != VSH_OK) {
-        return;
+    if (vsh_model_read(path, &cli_run, &reader->model, &cli_error) == VSH_OK) {
+        reader->mesh = vsh_model_mesh(reader->model, 0, -1);
+        reader->face_normals = make_normals(&reader->mesh);
+        reader->has_normals = true;
     }
-    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    make_normals(&mesh, reader);
-    vsh_model_free(model);
 }
 
 /* Gives the row the normal of the next vertex of a face, if that lies there. */
 static void set_normal(cli_points_reader *reader, vshi_table_row *row) {
     const size_t v = reader->next;
-    bool met = v < reader->face_vertices;
+    bool met = v < reader->mesh.vertex_count;
     for (size_t k = 0; k < 3; ++k) {
-        met = met && (float)row->value[k] == reader->face_positions[3 * v + k];
+        met = met && (float)row->value[k] == reader->mesh.positions[3 * v + k];
     }
     for (size_t k = 0; k < 3; ++k) {
         row->value[NX + k] = met ? (double)reader->face_normals[3 * v + k] : 0.0;
@@ -187,7 +151,8 @@ static void set_normal(cli_points_reader *reader, vshi_table_row *row) {
     reader->next += met;
 }
 
-static int32_t look_for_interrupt(void *user, const char *stage, double fraction) {
+/* A vsh_progress_fn that only stops the reading. */
+static int32_t check_interrupt(void *user, const char *stage, double fraction) {
     (void)user;
     (void)stage;
     (void)fraction;
@@ -198,20 +163,17 @@ int cli_points_open(const char *path, int32_t format, int normals, bool strict, 
     const vshi_table_columns wanted = {
         {"x", "y", "z", "nx", "ny", "nz"}, normals == 0 ? NX : NX + 3, normals == 1 ? NX + 3 : NX};
     vsh_run run = vsh_run_default();
-    run.progress = look_for_interrupt;
+    run.progress = check_interrupt;
     *reader = (cli_points_reader){.strict = strict, .job = vshi_job_begin(&run, "points", SIZE_MAX)};
     vshi_table *t = &reader->table;
-    vsh_error error;
     path = strcmp(path, "-") != 0 ? path : NULL;
-    if (vshi_table_open(path, format, &wanted, reader->job, t, &error) != VSH_OK) {
+    if (vshi_table_open(path, format, &wanted, reader->job, t, &cli_error) != VSH_OK) {
         struct stat status;
-        const bool waits = path != NULL && error.code == VSH_ERROR_READ && stat(path, &status) == 0 &&
-                           !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
-        if (waits) {
-            cli_say("%s; a pipe is read as standard input, by --points -", error.message);
-            return CLI_FILE;
-        }
-        return cli_fail(&error);
+        const bool is_pipe = path != NULL && cli_error.code == VSH_ERROR_READ && stat(path, &status) == 0 &&
+                             !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode);
+        return is_pipe ? cli_refuse(CLI_FILE, "%s; a pipe is read as standard input, by --points -",
+                                    cli_error.message)
+                       : cli_check(cli_error.code);
     }
     reader->has_normals = t->columns > NX;
     reader->floats = t->format != VSHI_TABLE_CSV;
@@ -226,8 +188,7 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
     points->kept_size = 0;
     while (points->count < points->room && points->kept_size <= most_kept) {
         vshi_table_row row;
-        vsh_error error;
-        CLI_TRY(cli_check(vshi_table_next(&reader->table, &row, &error), &error));
+        CLI_TRY(cli_check(vshi_table_next(&reader->table, &row, &cli_error)));
         if (row.bytes == NULL) {
             break;
         }
@@ -237,7 +198,7 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
         if (row.bad[0] == '\0') {
             check_row(reader, &row);
         }
-        if (row.bad[0] != '\0' && (++reader->bad <= SAID || reader->strict)) {
+        if (row.bad[0] != '\0' && (++reader->bad <= SHOWN || reader->strict)) {
             cli_say("%s: row %" PRIu64 ": %s", reader->table.source.name, reader->table.rows, row.bad);
         }
         if (row.bad[0] != '\0' && reader->strict) {
@@ -254,57 +215,47 @@ bool cli_points_can_keep(const cli_points_reader *reader) {
 
 void cli_points_close(cli_points_reader *reader) {
     vshi_table_close(&reader->table);
-    free(reader->face_positions);
     free(reader->face_normals);
-    reader->face_positions = reader->face_normals = NULL;
+    vsh_model_free(reader->model);
     vshi_job_end(reader->job);
-    reader->job = NULL;
+    *reader = (cli_points_reader){.job = NULL};
 }
 
-/* --- writing: the rows as they came if the format is the same, else position and normal; then answers */
-
-enum { COUNT_WIDTH = 20 };
+/* --- heads of the output. A row is the input's if the formats are the same, else position and normal; then
+ * answers */
 
 static int fail(const cli_points_writer *w) {
-    cli_say("%s: cannot be written: %s", w->name, strerror(errno));
-    return CLI_FILE;
+    return cli_refuse(CLI_FILE, "%s: cannot be written: %s", w->name, strerror(errno));
 }
 
-/* --- heads */
-
-/* The name of a column before the answers, if rows are not kept; NULL behind the last. */
-static const char *own_name(const cli_points_writer *w, int i) {
-    return w->answers_only || w->keep || i >= (w->normals ? 6 : 3) ? NULL : point_names[i];
+/* Returns the name of written column `i`: of the position and normal unless rows are kept, then of the
+ * answers. NULL after the last. */
+static const char *column_name(const cli_points_writer *w, size_t i) {
+    const size_t own = w->answers_only || w->keep ? 0 : w->normals ? 6 : 3;
+    return i < own ? point_names[i] : i - own < w->answers->width ? w->answers->names[i - own] : NULL;
 }
 
-static void write_csv_head(cli_points_writer *w, const cli_points_reader *reader) {
-    size_t written = 0;
+static void write_csv_head(const cli_points_writer *w, const cli_points_reader *reader) {
+    if (w->keep && reader->table.header == NULL) {
+        return; /* a file without a header stays one */
+    }
     if (w->keep) {
-        if (reader->table.header == NULL) {
-            return; /* a file without a header stays one */
-        }
         fwrite(reader->table.header, 1, reader->table.header_size, w->file);
-        ++written;
     }
-    for (int i = 0; own_name(w, i) != NULL; ++i, ++written) {
-        fprintf(w->file, "%.*s%s", written > 0, &w->delimiter, own_name(w, i));
-    }
-    for (size_t c = 0; c < w->answers->width; ++c, ++written) {
-        fprintf(w->file, "%.*s%s", written > 0, &w->delimiter, w->answers->names[c]);
+    for (size_t i = 0; column_name(w, i) != NULL; ++i) {
+        fprintf(w->file, "%.*s%s", i > 0 || w->keep, &w->delimiter, column_name(w, i));
     }
     putc('\n', w->file);
 }
 
 static void write_ply_properties(const cli_points_writer *w) {
-    for (int i = 0; own_name(w, i) != NULL; ++i) {
-        fprintf(w->file, "property %s %s\n", i < 3 && !w->floats ? "double" : "float", own_name(w, i));
-    }
-    for (size_t c = 0; c < w->answers->width; ++c) {
-        fprintf(w->file, "property float %s\n", w->answers->names[c]);
+    for (size_t i = 0; column_name(w, i) != NULL; ++i) {
+        const bool is_double = i < 3 && !w->floats && !w->keep && !w->answers_only;
+        fprintf(w->file, "property %s %s\n", is_double ? "double" : "float", column_name(w, i));
     }
 }
 
-/* The head is as long for any number of rows: a comment takes up the rest. */
+/* The head has the same length for any number of rows: a comment fills it up. */
 static void write_ply_head(const cli_points_writer *w, uint64_t rows) {
     char count[COUNT_WIDTH + 8];
     const int length = snprintf(count, sizeof count, "%" PRIu64, rows);
@@ -315,13 +266,6 @@ static void write_ply_head(const cli_points_writer *w, uint64_t rows) {
             COUNT_WIDTH - length, "", count);
     write_ply_properties(w);
     fputs("end_header\n", w->file);
-}
-
-static void write_kept_ply_head(const cli_points_writer *w, const cli_points_reader *reader) {
-    fwrite(reader->table.header, 1, reader->table.header_insert, w->file);
-    write_ply_properties(w);
-    fwrite(reader->table.header + reader->table.header_insert, 1,
-           reader->table.header_size - reader->table.header_insert, w->file);
 }
 
 /* Refuses answers with the name of a column that is there already. */
@@ -343,10 +287,8 @@ static int check_names(const cli_points_writer *w, const cli_points_reader *read
                 there = there || (begins && ends && memcmp(at, name, size) == 0);
             }
         }
-        if (there) {
-            return cli_usage("%s: it has a column '%s' already; --answers-only leaves its columns out",
-                             reader->table.source.name, name);
-        }
+        CLI_REFUSE_IF(there, "%s: it has a column '%s' already; --answers-only leaves its columns out",
+                      reader->table.source.name, name);
     }
     return CLI_OK;
 }
@@ -386,7 +328,10 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
     if (format == VSHI_TABLE_CSV) {
         write_csv_head(w, reader);
     } else if (format == VSHI_TABLE_PLY && w->keep) {
-        write_kept_ply_head(w, reader);
+        const vshi_table *t = &reader->table;
+        fwrite(t->header, 1, t->header_insert, w->file);
+        write_ply_properties(w);
+        fwrite(t->header + t->header_insert, 1, t->header_size - t->header_insert, w->file);
     } else if (format == VSHI_TABLE_PLY) {
         write_ply_head(w, w->counted ? 0 : reader->table.ply.element[reader->table.vertex].count);
     }
@@ -395,15 +340,15 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
 
 /* --- rows */
 
-static char *put_bits(const cli_points_writer *w, char *at, uint64_t bits, size_t size) {
+static char *write_bits(const cli_points_writer *w, char *at, uint64_t bits, size_t size) {
     for (size_t i = 0; i < size; ++i) {
         at[i] = (char)(bits >> 8 * (w->big_endian ? size - 1 - i : i));
     }
     return at + size;
 }
 
-/* Text has all digits of a double even for a float's position, so that readers get the same point. */
-static char *put_value(const cli_points_writer *w, char *at, double value, bool position) {
+/* Text has all digits of a double also for positions in floats, so that readers get the same point. */
+static char *write_value(const cli_points_writer *w, char *at, double value, bool position) {
     const float single = (float)value;
     if (w->text) {
         at = position ? vshi_decimal_write_double(at, value) : vshi_decimal_write_float(at, single);
@@ -413,11 +358,11 @@ static char *put_value(const cli_points_writer *w, char *at, double value, bool 
     if (position && !w->floats && w->format != VSHI_TABLE_RAW) {
         uint64_t bits;
         memcpy(&bits, &value, sizeof bits);
-        return put_bits(w, at, bits, sizeof bits);
+        return write_bits(w, at, bits, sizeof bits);
     }
     uint32_t bits;
     memcpy(&bits, &single, sizeof bits);
-    return put_bits(w, at, bits, sizeof bits);
+    return write_bits(w, at, bits, sizeof bits);
 }
 
 static bool write_row(const cli_points_writer *w, const cli_points *points, size_t i) {
@@ -432,14 +377,14 @@ static bool write_row(const cli_points_writer *w, const cli_points *points, size
         }
     } else if (!w->answers_only) {
         for (size_t k = 0; k < 3; ++k) {
-            at = put_value(w, at, points->positions[3 * i + k], true);
+            at = write_value(w, at, points->positions[3 * i + k], true);
         }
         for (size_t k = 0; w->normals && k < 3; ++k) {
-            at = put_value(w, at, points->normals[3 * i + k], false);
+            at = write_value(w, at, points->normals[3 * i + k], false);
         }
     }
     for (size_t c = 0; c < w->answers->width; ++c) {
-        at = put_value(w, at, w->answers->values[i * w->answers->width + c], false);
+        at = write_value(w, at, w->answers->values[i * w->answers->width + c], false);
     }
     if (w->text) {
         at[-1] = '\n';
@@ -457,30 +402,16 @@ int cli_points_write(cli_points_writer *w, const cli_points *points) {
     return fflush(w->file) == 0 ? CLI_OK : fail(w);
 }
 
-/* Copies the spool to standard output. */
-static int copy_spool(const cli_points_writer *w) {
-    rewind(w->spool);
-    char bytes[1 << 14];
-    size_t got;
-    while ((got = fread(bytes, 1, sizeof bytes, w->spool)) > 0) {
-        if (fwrite(bytes, 1, got, stdout) != got) {
-            return fail(w);
-        }
-    }
-    return ferror(w->spool) ? fail(w) : CLI_OK;
-}
-
 int cli_points_writer_commit(cli_points_writer *w, cli_points_reader *reader) {
-    vsh_error error;
-    CLI_TRY(cli_check(vshi_table_rest(&reader->table, w->keep ? w->file : NULL, &error), &error));
+    CLI_TRY(cli_check(vshi_table_rest(&reader->table, w->keep ? w->file : NULL, &cli_error)));
     if (w->counted) {
         if (fseek(w->file, 0, SEEK_SET) != 0) {
             return fail(w);
         }
         write_ply_head(w, w->rows);
     }
-    if (w->spool != NULL) {
-        CLI_TRY(fflush(w->spool) == 0 ? copy_spool(w) : fail(w));
+    if (w->spool != NULL && (fseek(w->spool, 0, SEEK_SET) != 0 || !cli_copy(w->spool, stdout))) {
+        return fail(w);
     }
     if (w->temporary.file != NULL) {
         return cli_temporary_commit(&w->temporary);

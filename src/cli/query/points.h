@@ -5,12 +5,8 @@
 #ifndef CLI_POINTS_H
 #define CLI_POINTS_H
 
-#include "cli/temporary.h"
+#include "cli/cli.h"
 #include "table/table.h"
-
-/* Parses an option's "csv", "ply" or "raw" to VSHI_TABLE_CSV, …; returns an exit code. */
-int cli_points_parse_format(const char *option, const char *text, int32_t *format);
-int32_t cli_points_format_of_path(const char *path); /* by its ending; -1 */
 
 /* Rows in memory. */
 typedef struct cli_points {
@@ -24,8 +20,6 @@ typedef struct cli_points {
     size_t *kept_end; /* [room] */
 } cli_points;
 
-/* Bytes that a row takes in cli_points, but for the bytes that are kept. */
-size_t cli_points_bytes(bool normals, bool keep);
 cli_points cli_points_create(size_t room, bool normals, bool keep);
 void cli_points_free(cli_points *points);
 
@@ -35,19 +29,20 @@ typedef struct cli_points_reader {
     bool has_normals, floats; /* floats: positions are floats in the file */
     bool strict;              /* a bad row ends the reading */
     uint64_t bad;             /* bad rows so far */
-    /* the vertices of a PLY's faces in the order of its rows, without those that no face has; NULL: normals,
-     * if any, are in the rows */
-    float *face_positions, *face_normals; /* [face_vertices][3] */
-    size_t face_vertices, next;           /* next: the one to expect */
+    /* a PLY's faces, whose vertices have the order of its rows without those that no face has */
+    vsh_model *model;    /* NULL: normals, if any, are in the rows */
+    vsh_mesh mesh;       /* of the model */
+    float *face_normals; /* [mesh.vertex_count][3] */
+    size_t next;         /* the vertex to expect */
 } cli_points_reader;
 
 /* Opens a file, or standard input for "-", and reads its header. `normals`: 1 requires them, 0 ignores them,
- * -1 reads them if they are there. These return CLI_OK or an exit code, having said why. */
+ * -1 reads them if there are any. Close it also after a failure. */
 int cli_points_open(const char *path, int32_t format, int normals, bool strict, cli_points_reader *reader);
 
-/* Gives a PLY's points the normals of its faces, if they have none. error->message says why it could not; ""
- * if there are no faces. */
-void cli_points_take_faces(const char *path, const vsh_run *run, cli_points_reader *reader, vsh_error *error);
+/* Gives a PLY's points the normals of its faces, if they have none. cli_error.message says why that failed;
+ * "" if there are no faces. */
+void cli_points_read_faces(const char *path, cli_points_reader *reader);
 
 /* Reads up to points->room rows; fewer at the end, or if they have more than `most_kept` bytes. */
 int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *points);
@@ -72,8 +67,8 @@ typedef struct cli_points_writer {
     bool text, big_endian, floats, normals; /* of the rows */
     char delimiter;
     const cli_points_answers *answers;
-    FILE *file;  /* head and rows are written to it */
-    FILE *spool; /* holds them for standard output if the head needs the rows' number; else NULL */
+    FILE *file;  /* for head and rows */
+    FILE *spool; /* the same file, if standard output needs the number of rows first; else NULL */
     cli_temporary temporary;
     uint64_t rows;
     bool counted; /* the head is written again with the number of rows */
@@ -87,6 +82,6 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
 /* Writes a batch, and sends it into a pipe now. */
 int cli_points_write(cli_points_writer *writer, const cli_points *points);
 int cli_points_writer_commit(cli_points_writer *writer, cli_points_reader *reader);
-void cli_points_writer_free(cli_points_writer *writer); /* abandons what is not committed */
+void cli_points_writer_free(cli_points_writer *writer); /* abandons an output that is not committed */
 
 #endif

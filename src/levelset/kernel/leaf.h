@@ -11,10 +11,10 @@
 extern "C" {
 #endif
 
-/* A triangle as seven functions that are linear in the place q, which is counted from the middle of a region:
- * the height over its plane, then of each edge the distance from the edge's line within the plane (positive
- * outside the triangle), then of each edge the place along it. Each is row[0] x + row[1] y + row[2] z +
- * row[3]; the edge itself reaches from `low` to `high` of its last function, whose row[3] is 0. */
+/* A triangle as seven linear functions of a place (x, y, z) relative to the middle of a region: row[0] x +
+ * row[1] y + row[2] z + row[3]. HEIGHT is the height over its plane. BESIDE, for each edge, is the distance
+ * from the edge's line within the plane, positive outside. ALONG is the place along the edge, which reaches
+ * from `low` to `high`; its row[3] is 0. */
 enum {
     VSHI_FRAME_HEIGHT = 0,
     VSHI_FRAME_BESIDE = 1,
@@ -31,12 +31,13 @@ typedef struct vshi_frame {
 } vshi_frame;
 
 typedef struct vshi_leaf_kernel {
-    /* The least distance, voxels, of each of a leaf's 8³ voxels (stored x · 64 + y · 8 + z) to `count`
-     * triangles frames[list[i]], `reach` where none is nearer; `middle` is the leaf's, from the region's.
-     * Returns whether one is nearer than `reach`. Exact to 1e-4 of a voxel. */
+    /* Measures the distance of a leaf's 8³ voxels (stored x · 64 + y · 8 + z) to the nearest of `count`
+     * triangles frames[list[i]], voxels, at most `reach`. `middle` is the leaf's, relative to the region's.
+     * Returns whether a distance is below `reach`. Exact to 1e-4 of a voxel. */
     int (*measure)(const vshi_frame *frames, const uint32_t *list, size_t count, const float middle[3],
                    float reach, float distances[VSHI_LEAF_VOXELS]);
-    /* The distances of the middles of a region's 4³ leaves (stored x · 16 + y · 4 + z) to one triangle. */
+    /* Measures the distances of the middles of a region's 4³ leaves (stored x · 16 + y · 4 + z) to one
+     * triangle. */
     void (*middles)(const vshi_frame *frame, float distances[VSHI_REGION_LEAVES]);
 } vshi_leaf_kernel;
 

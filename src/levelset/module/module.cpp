@@ -1,7 +1,7 @@
 #include "base/error.h"
 #include "levelset/calls.h"
 
-// Every symbol but this one is hidden (module.map): these functions are not the library's of the same names.
+// module.map hides every other symbol: these functions are not those of the same names in the library.
 #define VALUE_MAKE(name, parameters, arguments, none) name,
 #define VALUE_GIVE(result, name, parameters, arguments) name,
 #define VALUE_DO(name, parameters, arguments) name,

@@ -1,5 +1,5 @@
-/* vdbshade-reader: confines itself, and only then loads the library, whose own libraries begin threads before
- * any main (liblog4cplus, which OpenVDB brings, begins four), and parse. */
+/* vdbshade-reader: confines itself, and only then loads the library. Its libraries parse files, and some
+ * begin threads when they are loaded (OpenVDB's liblog4cplus begins four). */
 #include "base/memory.h"
 #include "sandbox/confine.h"
 
@@ -28,9 +28,9 @@ static int serve(char *name, char *argument, const vshi_reader_state *state) {
     }
     serve_fn *function;
     memcpy(&function, &symbol, sizeof function);
-    char word[sizeof VSHI_READER_HELD + 16];
-    snprintf(word, sizeof word, VSHI_READER_HELD "%d",
-             (int)state->confined + (state->cramped ? VSHI_HELD_FILE_LIMIT : 0));
+    char word[sizeof VSHI_READER_CONFINED + 16];
+    snprintf(word, sizeof word, VSHI_READER_CONFINED "%d",
+             (int)state->confined + (state->cramped ? VSHI_CONFINED_FILE_LIMIT : 0));
     char *words[] = {name, argument, word, NULL};
     return function(3, words);
 }
@@ -50,6 +50,7 @@ int main(int argc, char **argv) {
     if (state.code >= 0) {
         return state.code;
     }
-    /* what it holds goes with it: no destructor of a library is to run */
-    _exit(request.kind == VSHI_READ_CONFINEMENT ? vshi_reader_tell(&state) : serve(argv[0], argv[1], &state));
+    /* _exit(): destructors of libraries must not run */
+    _exit(request.kind == VSHI_READ_CONFINEMENT ? vshi_reader_answer_confinement(&state)
+                                                : serve(argv[0], argv[1], &state));
 }

@@ -1,11 +1,230 @@
-/* A bake as things of three.js: a scene of meshes that share arrays, each with a material that a mode sets. */
+/* A bake: its planes, its meshes in a scene of three.js, the charts of its UVs, and the texel under a point of the view. */
 'use strict';
 
 (function () {
+    /* --- planes */
+
+    async function inflate(bytes) {
+        if (typeof DecompressionStream === 'undefined') {
+            throw new Error('this browser is too old for the planes of a bake (it has no DecompressionStream)');
+        }
+        const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
+        return new Uint8Array(await new Response(stream).arrayBuffer());
+    }
+
+    /* A plane of halves: all high bytes, then all low ones, each less its left neighbour (src/view/planes.c). */
+    async function readPlane(id, width, height) {
+        const texels = width * height, bytes = await inflate(VIEW.block(id));
+        if (bytes.length !== 2 * texels) {
+            throw new Error('a plane is not as long as its size says');
+        }
+        const values = new Uint16Array(texels);
+        for (let half = 0; half < 2; ++half) {
+            for (let y = 0, i = 0; y < height; ++y) {
+                for (let x = 0, last = 0; x < width; ++x, ++i) {
+                    last = last + bytes[half * texels + i] & 255;
+                    values[i] |= half === 0 ? last << 8 : last;
+                }
+            }
+        }
+        return values;
+    }
+
+    /* IEEE 754 binary16 to a number, by a table of all of them. */
+    let numbers = null;
+    function halves() {
+        if (numbers === null) {
+            numbers = new Float32Array(65536);
+            for (let i = 0; i < 65536; ++i) {
+                const exponent = i >> 10 & 31, fraction = i & 1023;
+                const size = exponent === 0 ? fraction * 2 ** -24
+                    : exponent === 31 ? (fraction ? NaN : Infinity) : (1 + fraction / 1024) * 2 ** (exponent - 15);
+                numbers[i] = i & 32768 ? -size : size;
+            }
+        }
+        return numbers;
+    }
+
+    /* The half nearest to a finite number of 0 … 65504, as bits. */
+    function half(value) {
+        if (!(value > 0)) {
+            return 0;
+        }
+        const exponent = Math.max(Math.floor(Math.log2(value)), -14);
+        const bits = (exponent + 14) * 1024 + Math.round(value * 2 ** (10 - exponent));
+        return Math.min(bits, 31743);
+    }
+
+    /* --- the planes of a page of a bake */
+
+    const byName = (page, name) => page.channels.find(channel => channel.name === name);
+
+    /* Groups channels as they are shown: alone, or as three components by their last letter. */
+    function groupsOf(page) {
+        const groups = [];
+        for (const channel of page.channels) {
+            const found = /^(.*)\.([RGBXYZ])$/.exec(channel.name);
+            const axes = found && 'RGB'.includes(found[2]) ? 'RGB' : 'XYZ';
+            const three = found ? [...axes].map(axis => byName(page, found[1] + '.' + axis)) : [];
+            if (found && three.every(Boolean)) {
+                if (channel === three[0]) {
+                    groups.push({name: found[1], channels: three, vector: axes === 'XYZ', light: axes === 'RGB'});
+                }
+            } else if (/^[RGB]$/.test(channel.name) && 'RGB'.split('').every(name => byName(page, name))) {
+                if (channel.name === 'R') {
+                    groups.push({name: 'RGB', channels: [...'RGB'].map(name => byName(page, name)), light: true});
+                }
+            } else {
+                groups.push({name: channel.name, channels: [channel, channel, channel]});
+            }
+        }
+        return groups;
+    }
+
+    /* The light of a page, as in EXR's picture (docs/formats.md): the irradiance, else R, G and B, else the mean of the
+     * shadows times AO. */
+    function pictureOf(page) {
+        const groups = groupsOf(page);
+        const named = groups.find(group => group.name === 'irradiance') || groups.find(group => group.name === 'RGB');
+        if (named) {
+            return named;
+        }
+        const shadows = groups.filter(group => group.name.startsWith('shadow.'));
+        const ao = groups.find(group => group.name === 'ao');
+        if (shadows.length === 0 && !ao) {
+            return groups.find(group => group.name !== 'A') || null;
+        }
+        if (shadows.length + (ao ? 1 : 0) === 1) {
+            return shadows[0] || ao;
+        }
+        if (!page.mean) {
+            const number = halves(), values = new Uint16Array(page.width * page.height);
+            for (let i = 0; i < values.length; ++i) {
+                let sum = 0;
+                for (const shadow of shadows) {
+                    sum += number[shadow.channels[0].values[i]];
+                }
+                const light = shadows.length > 0 ? sum / shadows.length : 1;
+                values[i] = half(ao ? light * number[ao.channels[0].values[i]] : light);
+            }
+            page.mean = {name: 'picture', values};
+        }
+        return {name: 'shadow × ao', channels: [page.mean, page.mean, page.mean]};
+    }
+
+    function groupOf(page, name) {
+        return groupsOf(page).find(group => group.name === name) || null;
+    }
+
+    VIEW.loadPlanes = async function (bakes, tell) {
+        for (const bake of bakes) {
+            for (const page of bake.pages) {
+                for (const channel of page.channels) {
+                    tell(page.name + ': ' + channel.name);
+                    channel.values = await readPlane(channel.data, page.width, page.height);
+                }
+            }
+        }
+    };
+
+    /* --- charts and texel density of lightmap UVs */
+
+    /* Vertices that are one in space and in the lightmap: numbers from 0, by an open hash of their bits. */
+    function weld(position, uv, count) {
+        const values = [new Uint32Array(position.buffer, position.byteOffset, 3 * count),
+            new Uint32Array(uv.buffer, uv.byteOffset, 2 * count)];
+        let capacity = 16;
+        while (capacity < 2 * count) {
+            capacity *= 2;
+        }
+        const table = new Int32Array(capacity).fill(-1), welded = new Uint32Array(count);
+        const same = (a, b) => values[0][3 * a] === values[0][3 * b] && values[0][3 * a + 1] === values[0][3 * b + 1] &&
+            values[0][3 * a + 2] === values[0][3 * b + 2] && values[1][2 * a] === values[1][2 * b] &&
+            values[1][2 * a + 1] === values[1][2 * b + 1];
+        for (let i = 0; i < count; ++i) {
+            let hash = 0;
+            for (const word of [values[0][3 * i], values[0][3 * i + 1], values[0][3 * i + 2], values[1][2 * i],
+                values[1][2 * i + 1]]) {
+                hash = Math.imul(hash ^ word, 0x9e3779b1);
+                hash ^= hash >>> 15;
+            }
+            let place = (hash >>> 0) % capacity;
+            while (table[place] >= 0 && !same(table[place], i)) {
+                place = (place + 1) % capacity;
+            }
+            if (table[place] < 0) {
+                table[place] = i;
+            }
+            welded[i] = table[place];
+        }
+        return welded;
+    }
+
+    /* A hue for each number, neighbours far apart. */
+    function hueOf(number) {
+        const hue = number * 0.618033988749895 % 1, light = 0.52 + 0.16 * (number * 0.7548776662 % 1);
+        return new THREE.Color().setHSL(hue, 0.62, light);
+    }
+
+    /* {count, colors, chart}: the charts of a thing, numbered from `first`, and the chart and colour of each vertex. */
+    function chartsOf(drawn, first) {
+        const {arrays, uvs: uv} = drawn, count = arrays.count, indices = arrays.indices;
+        const parent = weld(arrays.position, uv, count);
+        const find = i => {
+            while (parent[i] !== i) {
+                parent[i] = parent[parent[i]];
+                i = parent[i];
+            }
+            return i;
+        };
+        for (let i = 0; i < indices.length; i += 3) {
+            const a = find(indices[i]);
+            for (const other of [indices[i + 1], indices[i + 2]]) {
+                const b = find(other);
+                if (a !== b) {
+                    parent[Math.max(find(a), b)] = Math.min(find(a), b);
+                }
+            }
+        }
+        const numbers = new Map(), chart = new Uint32Array(count), colors = new Float32Array(3 * count);
+        for (let i = 0; i < indices.length; ++i) {
+            const vertex = indices[i], root = find(vertex);
+            if (!numbers.has(root)) {
+                numbers.set(root, first + numbers.size);
+            }
+            chart[vertex] = numbers.get(root);
+        }
+        let last = -1, color = null;
+        for (let i = 0; i < count; ++i) {
+            if (chart[i] !== last || color === null) {
+                last = chart[i];
+                color = hueOf(last);
+            }
+            color.toArray(colors, 3 * i);
+        }
+        return {count: numbers.size, chart, colors};
+    }
+
+    /* Sums up a thing's areas in the world and in texels. */
+    function areasOf(drawn, size) {
+        const {arrays, matrix, uvs: uv} = drawn, p = [0, 1, 2].map(() => new THREE.Vector3());
+        let world = 0, texels = 0;
+        for (let i = 0; i < arrays.indices.length; i += 3) {
+            const [a, b, c] = arrays.indices.subarray(i, i + 3);
+            [a, b, c].forEach((vertex, k) => p[k].fromArray(arrays.position, 3 * vertex).applyMatrix4(matrix));
+            world += p[1].sub(p[0]).cross(p[2].sub(p[0])).length() / 2;
+            texels += Math.abs((uv[2 * b] - uv[2 * a]) * (uv[2 * c + 1] - uv[2 * a + 1]) -
+                (uv[2 * c] - uv[2 * a]) * (uv[2 * b + 1] - uv[2 * a + 1])) / 2 * size[0] * size[1];
+        }
+        return {world, texels};
+    }
+
+    /* --- meshes that share arrays, each with a material that a mode sets */
+
     const ASSUMED = 1024; /* texels a side, where no lightmap says how many there are */
     const ONE = 0x3c00;   /* 1 as a half */
 
-    /* Which lightmap a thing has its texels in: the images in their order, or pages in theirs. */
+    /* Returns a function that finds the page of a thing: its image's place among all lightmaps. */
     function numberPages(loaded) {
         const sourceOf = drawn => {
             const {light, ao} = drawn.material;
@@ -50,7 +269,7 @@
         return of.get(key).geometry;
     }
 
-    /* Puts meshes into bake.scene. `loaded` is what VIEW.loadScene() gave; bakes of one file share it. */
+    /* Makes the meshes of bake.scene. Bakes of one file share `loaded`, the result of VIEW.loadScene(). */
     VIEW.build = function (bake, loaded) {
         const pageOf = numberPages(loaded), known = loaded.geometries = loaded.geometries || new Map();
         bake.scene = new THREE.Scene();
@@ -82,8 +301,8 @@
         return made;
     }
 
-    /* Charts and density are looked for when they are first asked for. */
-    VIEW.needCharts = function (bake) {
+    /* Charts and density are found when they are first shown. */
+    function needCharts(bake) {
         if (bake.charts !== undefined) {
             return;
         }
@@ -91,39 +310,39 @@
         for (const mesh of bake.meshes) {
             const {drawn} = mesh.userData;
             if (drawn.set >= 0) {
-                const found = VIEW.chartsOf(drawn, bake.charts);
+                const found = chartsOf(drawn, bake.charts);
                 mesh.geometry = withAttribute(mesh.geometry, 'chart', new THREE.BufferAttribute(found.colors, 3));
                 mesh.userData.chart = found.chart;
                 bake.charts += found.count;
             }
         }
-    };
+    }
 
-    VIEW.needDensity = function (bake) {
+    function needDensity(bake) {
         if (bake.density !== undefined) {
             return;
         }
         let world = 0, texels = 0;
         for (const mesh of bake.meshes) {
             if (mesh.userData.drawn.set >= 0) {
-                const areas = VIEW.areasOf(mesh.userData.drawn, mesh.userData.size);
+                const areas = areasOf(mesh.userData.drawn, mesh.userData.size);
                 world += areas.world;
                 texels += areas.texels;
             }
         }
         bake.density = world > 0 ? Math.sqrt(texels / world) : 0;
-    };
+    }
 
-    /* What the planes of a page have for a mode; null: nothing. */
+    /* The group of planes for a mode, or null. */
     function groupFor(page, mode, channel) {
         if (mode === 'lit') {
-            return VIEW.picture(page);
+            return pictureOf(page);
         }
         if (mode === 'ao' || mode === 'bent') {
-            return VIEW.group(page, mode);
+            return groupOf(page, mode);
         }
         if (mode === 'light') {
-            return VIEW.group(page, channel);
+            return groupOf(page, channel);
         }
         if (mode === 'invalid') {
             const invalid = page.channels.find(c => c.name === 'invalid'), a = page.channels.find(c => c.name === 'A');
@@ -132,9 +351,9 @@
         return null;
     }
 
-    /* The names of what a bake has for `light`, its lights first. */
+    /* Names of the channels in mode `light`, the lights first. */
     VIEW.lightsOf = function (bake) {
-        const names = bake.pages.length > 0 ? VIEW.groups(bake.pages[0]).map(group => group.name) : [];
+        const names = bake.pages.length > 0 ? groupsOf(bake.pages[0]).map(group => group.name) : [];
         const first = names.filter(name => /^(irradiance|RGB|shadow\.|tint\.|sky$)/.test(name));
         const list = [...first, ...names.filter(name => !first.includes(name) && name !== 'ao' && name !== 'bent')];
         return bake.meshes.some(mesh => mesh.userData.drawn.material.light) ? ['lightmap', ...list] : list;
@@ -162,10 +381,10 @@
 
     VIEW.show = function (bake, state) {
         if (state.mode === 'charts') {
-            VIEW.needCharts(bake);
+            needCharts(bake);
         }
         if (state.mode === 'density') {
-            VIEW.needDensity(bake);
+            needDensity(bake);
         }
         for (const mesh of bake.meshes) {
             const {page} = mesh.userData, material = mesh.material, u = material.uniforms;
@@ -198,5 +417,72 @@
             material.wireframe = state.wireframe;
             material.side = state.sides ? THREE.DoubleSide : material.userData.side;
         }
+    };
+
+    /* --- picking */
+
+    const raycaster = new THREE.Raycaster();
+
+    /* A texel's coordinate within 0 … count - 1, repeated. */
+    const wrap = (x, count) => ((Math.floor(x) % count) + count) % count;
+
+    /* Finds the texel of a bake at (x, y), normalized device coordinates; null: none. */
+    VIEW.pick = function (bake, camera, x, y) {
+        camera.updateMatrixWorld();
+        raycaster.setFromCamera({x, y}, camera);
+        const hit = raycaster.intersectObjects(bake.meshes, false)[0];
+        if (!hit) {
+            return null;
+        }
+        const {drawn, page, size, chart} = hit.object.userData, vertices = [hit.face.a, hit.face.b, hit.face.c];
+        const found = {bake, object: hit.object, drawn, page, size, point: hit.point, triangle: hit.faceIndex,
+            chart: chart ? chart[vertices[0]] : null, uv: null, texel: null, weights: null, vertices};
+        if (drawn.set >= 0 || bake.perVertex) {
+            const corner = k => new THREE.Vector3().fromArray(drawn.arrays.position, 3 * vertices[k]).applyMatrix4(drawn.matrix);
+            const weights = new THREE.Vector3();
+            new THREE.Triangle(corner(0), corner(1), corner(2)).getBarycoord(hit.point, weights);
+            found.weights = weights.toArray();
+        }
+        if (drawn.set >= 0) {
+            const uv = drawn.uvs, w = found.weights;
+            found.uv = [0, 1].map(axis => vertices.reduce((sum, vertex, k) => sum + w[k] * uv[2 * vertex + axis], 0));
+            found.texel = found.uv.map((value, axis) => wrap(value * size[axis], size[axis]));
+        }
+        return found;
+    };
+
+    const canvas = document.createElement('canvas');
+    canvas.width = canvas.height = 1;
+
+    /* R, G, B, A of an image's pixel, 0 … 255. */
+    function pixel(image, u, v) {
+        const context = canvas.getContext('2d', {willReadFrequently: true});
+        const x = wrap(u * image.width, image.width), y = wrap(v * image.height, image.height);
+        context.clearRect(0, 0, 1, 1);
+        context.drawImage(image, -x, -y);
+        return context.getImageData(0, 0, 1, 1).data;
+    }
+
+    /* [[name, text]] of a picked texel's values. */
+    VIEW.values = function (found) {
+        const list = [], number = halves(), {material} = found.drawn;
+        const text = value => Number.isFinite(value) ? String(+value.toPrecision(4)) : String(value);
+        if (found.page && (found.texel || found.bake.perVertex)) {
+            const at = found.texel ? [found.texel[1] * found.page.width + found.texel[0]] : found.vertices;
+            const weights = found.texel ? [1] : found.weights;
+            const mean = channel => at.reduce((sum, place, k) => sum + weights[k] * number[channel.values[place]], 0);
+            for (const group of groupsOf(found.page)) {
+                const values = [...new Set(group.channels)].map(channel => text(mean(channel)));
+                list.push([group.name, values.join('  ')]);
+            }
+        }
+        for (const [name, map] of [['lightmap', material.light], ['occlusion', material.ao]]) {
+            const uv = map && map.set === found.drawn.set ? found.uv : null;
+            if (uv) {
+                const rgb = [...pixel(map.image, uv[0], uv[1])].slice(0, 3);
+                list.push([name + ' / 255', name === 'occlusion' ? String(rgb[0]) : rgb.join('  ')]);
+            }
+        }
+        return list;
     };
 })();

@@ -1,4 +1,5 @@
-/* The view: loads what the page carries, draws it when something has changed, and takes what is done to it. */
+/* The view: loads what the page carries, draws it after a change, and handles all input. Texts of files are only shown as
+ * text. */
 'use strict';
 
 (function () {
@@ -7,7 +8,135 @@
         theme: matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark', ui: true, picks: null};
     let renderer, camera, controls, bakes = [], box = null, due = false;
 
-    /* --- the address: #mode=ao&camera=X,Y,Z,X,Y,Z is a view to come back to */
+    /* --- panels: modes, lights, sliders, the picked texel */
+
+    function element(name, text = '') {
+        const made = document.createElement(name);
+        made.textContent = text;
+        return made;
+    }
+
+    function makeModes() {
+        VIEW.MODES.forEach(([mode, name], i) => {
+            const button = element('button', name);
+            button.type = 'button';
+            button.dataset.mode = mode;
+            button.setAttribute('role', 'radio');
+            button.prepend(element('kbd', String(i + 1)));
+            button.onclick = () => set({mode});
+            byId('modes').append(button);
+        });
+    }
+
+    /* Disables the modes that no bake has. */
+    function showModes() {
+        VIEW.MODES.forEach(([mode, , hint], i) => {
+            const button = byId('modes').children[i], there = bakes.some(bake => VIEW.has(bake, mode));
+            button.disabled = !there;
+            button.title = there ? hint : 'nothing of it is in the files';
+            button.setAttribute('aria-checked', String(mode === state.mode));
+            button.tabIndex = mode === state.mode ? 0 : -1;
+        });
+    }
+
+    function showLights(lights) {
+        const names = [...new Set(lights)], select = byId('channel');
+        if ([...select.options].map(option => option.value).join('\n') !== names.join('\n')) {
+            select.replaceChildren(...names.map(name => element('option', name)));
+        }
+        select.value = state.channel;
+    }
+
+    function showSides() {
+        document.title = bakes.map(bake => bake.name).join(' | ');
+        byId('names').textContent = bakes.map(bake => bake.name).join('  |  ');
+        byId('compare').hidden = bakes.length < 2;
+        byId('split').value = state.split;
+        byId('bar').style.left = 100 * state.split + '%';
+        ['left', 'right'].forEach((side, i) => {
+            byId(side).textContent = byId(side).title = bakes[i] ? bakes[i].name : '';
+        });
+    }
+
+    function showLegend(bake) {
+        const box = byId('legend');
+        box.textContent = '';
+        const entry = (color, text) => {
+            const swatch = element('i');
+            swatch.style.background = color;
+            const line = element('span');
+            line.append(swatch, text);
+            box.append(line);
+        };
+        if (state.mode === 'density') {
+            VIEW.DENSITY.forEach((rgb, i) => entry('rgb(' + rgb + ')',
+                (i === 0 ? '≤ ' : i === 4 ? '≥ ' : '') + +(bake.density * 2 ** (i - 2)).toPrecision(3)));
+            box.append(element('span', 'texels a unit'));
+        } else if (state.mode === 'invalid') {
+            entry('rgb(237,26,153)', 'invalid: inside a solid or behind a wall');
+            entry('rgb(242,166,38)', 'no sample: filled from neighbours');
+            entry('rgb(158,158,158)', 'valid');
+        } else if (state.mode === 'charts') {
+            box.append(element('span', bake.charts + (bake.charts === 1 ? ' chart' : ' charts')));
+        }
+        box.hidden = box.childNodes.length === 0;
+    }
+
+    /* Shows the state in the panels. */
+    function showState(lights) {
+        showModes();
+        showLights(lights);
+        showSides();
+        byId('lights').hidden = state.mode !== 'light';
+        byId('exposure').value = state.exposure;
+        byId('exposure-value').textContent = (state.exposure > 0 ? '+' : '') + state.exposure.toFixed(1) + ' EV';
+        ['texels', 'wireframe', 'sides'].forEach(name => { byId(name).checked = state[name]; });
+        document.documentElement.dataset.theme = state.theme;
+        document.body.classList.toggle('bare', !state.ui);
+        showLegend(bakes[0]);
+    }
+
+    /* Shows the picked texels, a table for each bake. */
+    function showPicked(picked) {
+        const box = byId('picked');
+        box.textContent = '';
+        box.hidden = picked.length === 0;
+        for (const found of picked) {
+            const {drawn} = found, table = element('table'), rows = [];
+            const three = value => +value.toFixed(3);
+            const close = element('h2', drawn.name);
+            rows.push(['bake', found.bake.name], ['material', drawn.material.name], ['triangle', String(found.triangle)],
+                ['position', [found.point.x, found.point.y, found.point.z].map(three).join('  ')]);
+            if (found.texel) {
+                rows.push(['UV set', String(drawn.set)], ['UV', found.uv.map(value => value.toFixed(5)).join('  ')],
+                    ['texel', found.texel.join('  ') + ' of ' + found.size.join(' × ')]);
+            } else {
+                rows.push(['UV set', 'none']);
+            }
+            if (found.chart !== null) {
+                rows.push(['chart', String(found.chart)]);
+            }
+            for (const [name, text] of [...rows, ...VIEW.values(found)].filter(row => row[1] !== '')) {
+                const row = table.insertRow();
+                row.append(element('th', name), element('td', text));
+            }
+            box.append(close, table);
+        }
+    }
+
+    function message(text, wrong) {
+        const box = byId('message');
+        box.textContent = text;
+        box.hidden = text === '';
+        box.classList.toggle('wrong', wrong === true);
+    }
+
+    function showProblems(list) {
+        byId('problems').hidden = list.length === 0;
+        byId('problems').textContent = list.join('\n');
+    }
+
+    /* --- the address, which stores a view: #mode=ao&camera=X,Y,Z,X,Y,Z */
 
     const readers = {
         mode: text => VIEW.MODES.some(mode => mode[0] === text) ? text : 'lit', channel: text => text,
@@ -39,15 +168,15 @@
     }
 
     function writeAddress() {
-        const told = new URLSearchParams();
+        const written = new URLSearchParams();
         for (const key of Object.keys(readers)) {
             const value = state[key];
-            told.set(key, value === true ? '1' : value === false ? '0' : value === null ? '' : String(value));
+            written.set(key, value === true ? '1' : value === false ? '0' : value === null ? '' : String(value));
         }
-        told.set('camera', [...camera.position.toArray(), ...controls.target.toArray()].map(x => +x.toPrecision(6)).join());
-        location.replace('#' + told);
-        VIEW.message('The address holds this view now.');
-        setTimeout(() => VIEW.message(''), 1500);
+        written.set('camera', [...camera.position.toArray(), ...controls.target.toArray()].map(x => +x.toPrecision(6)).join());
+        location.replace('#' + written);
+        message('The address holds this view now.');
+        setTimeout(() => message(''), 1500);
     }
 
     /* --- drawing */
@@ -91,7 +220,7 @@
             state.mode = 'lit';
         }
         bakes.forEach(bake => VIEW.show(bake, state));
-        VIEW.tell(state, bakes);
+        showState(lights);
         redraw();
     }
 
@@ -100,7 +229,7 @@
         update();
     }
 
-    /* From 35° to the right of the front and 25° above, as `render` stands. */
+    /* Moves the camera as `render` does: 35° to the right of the front, and 25° above. */
     function frame() {
         const center = box.getCenter(new THREE.Vector3()), radius = Math.max(box.getSize(new THREE.Vector3()).length() / 2, 1e-6);
         const wide = Math.min(1, camera.aspect), distance = radius / Math.sin(camera.fov * Math.PI / 360) / wide;
@@ -111,7 +240,7 @@
         controls.update();
     }
 
-    /* Near and far as the model lies from here. */
+    /* Sets near and far by the model's distance. */
     function clip() {
         const sphere = box.getBoundingSphere(new THREE.Sphere()), radius = Math.max(sphere.radius, 1e-6);
         const distance = camera.position.distanceTo(sphere.center);
@@ -133,12 +262,12 @@
                 found.object.material.uniforms.picked.value.set(found.texel[0], found.texel[1]);
             }
         }
-        VIEW.tellPicked(at.filter(Boolean));
+        showPicked(at.filter(Boolean));
         redraw();
         return at[bakes.length > 1 && x / innerWidth > state.split ? 1 : 0];
     }
 
-    /* --- what is done to it */
+    /* --- input */
 
     const modeKeys = index => VIEW.MODES[index] && bakes.some(bake => VIEW.has(bake, VIEW.MODES[index][0]))
         ? set({mode: VIEW.MODES[index][0]}) : undefined;
@@ -225,7 +354,7 @@
 
     /* --- loading */
 
-    /* Lets the browser show what was said. */
+    /* Lets the browser show a message. */
     const breathe = () => new Promise(resolve => setTimeout(resolve, 0));
 
     async function loadModel(bake, tell) {
@@ -242,7 +371,7 @@
         const tell = text => {
             if (performance.now() - said > 100) {
                 said = performance.now();
-                VIEW.message('Loading ' + text);
+                message('Loading ' + text);
             }
         };
         bakes = about;
@@ -254,7 +383,7 @@
             bake.shared = bake.model === undefined ? bakes[0].shared : await loadModel(bake, tell);
             bake.shared.problems.forEach(problem => problems.add(bake.name + ': ' + problem));
         }
-        VIEW.problems([...problems]);
+        showProblems([...problems]);
         box = new THREE.Box3();
         for (const bake of bakes) {
             VIEW.build(bake, bake.shared);
@@ -265,7 +394,8 @@
     async function begin() {
         const canvas = byId('view'), context = canvas.getContext('webgl2', {antialias: true, alpha: true});
         if (!context) {
-            throw new Error('This browser shows no WebGL 2, which the view is drawn with. It may be turned off in its settings, or the graphics driver be too old.');
+            throw new Error('This browser shows no WebGL 2, which the view is drawn with. It may be turned off in its settings, or the ' +
+                'graphics driver be too old.');
         }
         const about = JSON.parse(byId('about').textContent);
         renderer = new THREE.WebGLRenderer({canvas, context});
@@ -278,7 +408,7 @@
         frame();
         readAddress();
         clip();
-        VIEW.makeModes(mode => set({mode}));
+        makeModes();
         byId('channel').onchange = event => set({channel: event.target.value});
         watch(canvas);
         resize();
@@ -287,12 +417,12 @@
             pick(state.picks[0] * innerWidth, state.picks[1] * innerHeight);
         }
         draw();
-        VIEW.message('');
+        message('');
         document.documentElement.dataset.state = 'ready';
     }
 
     begin().catch(error => {
-        VIEW.message(error.message, true);
+        message(error.message, true);
         document.documentElement.dataset.state = 'failed';
     });
 })();

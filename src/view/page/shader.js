@@ -1,15 +1,23 @@
-/* One shader for all that is shown. Planes are linear; what a mode makes of them is sRGB only where it is light. */
+/* One shader for everything. Planes are linear; a mode's result is sRGB only if it is light. */
 'use strict';
 
 (function () {
-    VIEW.MODE = {lit: 0, ao: 1, light: 2, bent: 3, checker: 4, density: 5, invalid: 6, charts: 7, base: 8};
+    /* Modes: name, label, hint. */
+    VIEW.MODES = [
+        ['lit', 'Lit', 'base colour times light'], ['ao', 'Ambient occlusion', '1 open, 0 closed'],
+        ['light', 'Light', 'one light or channel'], ['bent', 'Bent normals', 'colours of (1 + n) / 2'],
+        ['checker', 'UV checker', 'squares of 8 × 8 texels'], ['density', 'Texel density', 'texels a unit'],
+        ['invalid', 'Invalid texels', 'inside solids, behind walls'], ['charts', 'Charts', 'a colour each'],
+        ['base', 'Base colour', 'without light']
+    ];
+    VIEW.MODE = Object.fromEntries(VIEW.MODES.map(([name], number) => [name, number]));
 
     /* A quarter of the mean density, half of it, the mean, twice, four times. */
     VIEW.DENSITY = [[33, 79, 191], [92, 171, 222], [224, 224, 217], [245, 166, 69], [204, 41, 38]];
     const DENSITY = VIEW.DENSITY.map(rgb => 'vec3(' + rgb.map(value => (value / 255).toFixed(5)).join() + ')');
 
-    /* Lookups stay within triangles where a pixel's middle does not (centroid), else charts' borders show what lies beside
-     * them; what is derived (place) does not bend there. */
+    /* Lookups use centroids: a pixel's middle may lie outside of the triangle, where other charts are. vPlace, for
+     * derivatives, uses the middle. */
     const VARYINGS = `
 centroid varying vec2 vLight, vBase, vAo, vGlow;
 varying vec2 vPlace;
@@ -64,9 +72,9 @@ vec3 ramp(float x) { /* 0 ... 1: too few, as in the mean, too many */
     return mix(few, ${DENSITY[4]}, clamp(4.0 * x - 3.0, 0.0, 1.0));
 }
 vec3 grey(float x) { return vec3(x); }
-/* What a white surface sends back: the lightmap is linear irradiance, as three.js and Hubs take it. */
+/* Light from a white surface: the lightmap is linear irradiance, as in three.js and Hubs. */
 vec3 baked() { return texture2D(lightMap, vLight).rgb * intensity / 3.14159265358979; }
-/* The shape of what has no light of its own. */
+/* Shading of surfaces without light. */
 float shape() {
     vec3 n = normalize(dot(vNormalView, vNormalView) > 0.0 ? vNormalView : cross(dFdx(vView), dFdy(vView)));
     return 0.55 + 0.45 * abs(dot(n, normalize(vView)));
@@ -156,7 +164,7 @@ void main() {
         return made;
     };
 
-    /* Planes of a group as a texture; one that stays until others push it out. */
+    /* Planes of a group as a texture, in a cache of the last ones. */
     const kept = [], MOST_KEPT = 6;
     VIEW.planeTexture = function (page, group) {
         const found = kept.find(entry => entry.page === page && entry.name === group.name);

@@ -16,8 +16,10 @@ bl_info = {
 
 import bpy
 
-from .bake import Bake, BakeError
-from .scene import is_caster
+from .bake import Bake
+from .scene import BakeError, is_caster
+
+ERRORS = (BakeError, OSError, RuntimeError)
 
 
 class VDBSHADE_OT_bake(bpy.types.Operator):
@@ -34,7 +36,7 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
     def finish(self, context, code):
         try:
             image = self.bake.end(context, code)
-        except (BakeError, OSError, RuntimeError) as error:
+        except ERRORS as error:
             return self.fail(error)
         for warning in self.bake.warnings:
             self.report({"WARNING"}, warning)
@@ -49,18 +51,15 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
     def execute(self, context):
         try:
             self.start(context)
-        except (BakeError, OSError, RuntimeError) as error:
-            return self.fail(error)
-        try:
             code = self.bake.wait()
-        except (BakeError, OSError, RuntimeError) as error:
+        except ERRORS as error:
             return self.fail(error)
         return self.finish(context, code)
 
     def invoke(self, context, event):
         try:
             self.start(context)
-        except (BakeError, OSError, RuntimeError) as error:
+        except ERRORS as error:
             return self.fail(error)
         manager = context.window_manager
         self.timer = manager.event_timer_add(0.1, window=context.window)
@@ -78,7 +77,7 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
             return {"PASS_THROUGH"}
         try:
             code = self.bake.poll()
-        except (BakeError, OSError, RuntimeError) as error:
+        except ERRORS as error:
             self.leave(context)
             return self.fail(error)
         context.window_manager.progress_update(self.bake.progress[0])

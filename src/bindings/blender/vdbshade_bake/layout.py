@@ -1,24 +1,34 @@
-"""Lightmap UVs by `vdbshade unwrap`: which objects need them, and how they come back into the meshes."""
+"""Lightmap UVs by `vdbshade unwrap`: finds the objects that need them, and writes them into the meshes."""
 import os
 
 import bmesh
 import bpy
 
-from . import materials, scene
+from . import scene
 from .scene import BakeError
+
+UV_NAME = "Lightmap"  # of new UV maps
+
+
+def lightmap_uv(obj):
+    """The UV map of an object's lightmap: the one named UV_NAME, or the second; else None."""
+    layers = obj.data.uv_layers
+    if UV_NAME in layers:
+        return UV_NAME
+    return layers[1].name if len(layers) > 1 else None
 
 
 def needs_layout(receivers, how):
-    """Whether UVs are to be made: where an object has none for a lightmap, or shares them with another."""
+    """Whether UVs must be made: an object has none for a lightmap, or shares them with another."""
     if how == "NEVER":
         return False
     data = [obj.data.name for obj in receivers]
     return how == "ALWAYS" or len(set(data)) < len(data) or \
-        any(materials.lightmap_uv(obj) is None for obj in receivers)
+        any(lightmap_uv(obj) is None for obj in receivers)
 
 
 class Layout:
-    """All receivers in one square. UVs that serve are kept as charts, and packed with those that are made."""
+    """All receivers in one square. Usable UVs are kept as charts, and packed with the new ones."""
 
     def __init__(self, context, receivers, how):
         if context.mode != "OBJECT":
@@ -32,7 +42,7 @@ class Layout:
                 raise BakeError("'%s': comes from another file, and so cannot have UVs made; make it local" % obj.name)
 
     def part(self):
-        """Meshes that several objects have become one each: a lightmap has a place for each object."""
+        """Gives objects that share a mesh a mesh each: a lightmap has a place for each object."""
         seen, parted = set(), []
         for obj in self.receivers:
             if obj.data.name in seen:
@@ -44,16 +54,16 @@ class Layout:
         return parted
 
     def command(self, program, folder, settings, depsgraph):
-        """Writes what is laid out; the program's command line."""
-        names = {obj.name: materials.lightmap_uv(obj) if self.keep else None for obj in self.receivers}
+        """Writes the receivers; returns the program's command line."""
+        names = {obj.name: lightmap_uv(obj) if self.keep else None for obj in self.receivers}
         there = scene.write_glb(os.path.join(folder, "layout.glb"), self.receivers, depsgraph, names, own_corners=True)
         self.laid = [obj for obj in self.receivers if obj.name in there]
         command = [program, "unwrap", "layout.glb", "-o", "layout.obj", "--progress", "--size", str(settings.size),
                    "--padding", str(settings.padding)]
         return command + ["--keep"] if self.keep else command
 
-    def take(self, folder):
-        """The UVs into the meshes."""
+    def read(self, folder):
+        """Writes the new UVs into the meshes."""
         numpy = scene.numpy_of()
         laid = read_obj(os.path.join(folder, "layout.obj"))
         if len(laid) != len(self.laid):
@@ -65,18 +75,18 @@ class Layout:
             corners, uvs = numpy.array(corners), numpy.array(uvs, numpy.float32)
             of_corner[corners] = uvs
             cut = numpy.unique(corners[(of_corner[corners] != uvs).any(axis=1)])
-            self.put(obj, of_corner)
+            self.set_uvs(obj, of_corner)
             if len(cut) > 0:  # Blender's faces have one place for each corner
                 self.split(obj, cut, corners.reshape(-1, 3), uvs.reshape(-1, 3, 2))
 
     def split(self, obj, cut, triangles, uvs):
-        """Splits the faces of the corners `cut` into the triangles that were laid out, each with UVs of its own."""
+        """Splits the faces of the corners `cut` into the triangles of the layout, each with its own UVs."""
         backup, made = bmesh.new(), bmesh.new()
         backup.from_mesh(obj.data)
         made.from_mesh(obj.data)
         made.faces.ensure_lookup_table()
         made.verts.ensure_lookup_table()
-        layer = made.loops.layers.uv[materials.UV_NAME]
+        layer = made.loops.layers.uv[UV_NAME]
         face_of = {loop: face.index for face in obj.data.polygons for loop in face.loop_indices}
         pieces = {face: [made.faces[face]] for face in {face_of[corner] for corner in cut}}
         for corners, places in zip(triangles, uvs):
@@ -94,24 +104,24 @@ class Layout:
         self.undo.append(lambda: backup.to_mesh(obj.data))
         self.warnings.append("'%s': %d bent faces are triangles now, as the lightmap parts them" % (obj.name, len(pieces)))
 
-    def put(self, obj, uvs):
+    def set_uvs(self, obj, uvs):
         layers = obj.data.uv_layers
-        active, layer = layers.active_index, layers.get(materials.UV_NAME)
+        active, layer = layers.active_index, layers.get(UV_NAME)
         if layer is None:
-            layer = layers.new(name=materials.UV_NAME, do_init=False)
+            layer = layers.new(name=UV_NAME, do_init=False)
             if layer is None:
                 raise BakeError("'%s': has as many UV maps as there can be" % obj.name)
             if len(layers) > 1:
                 layers.active_index = active
-            self.undo.append(lambda obj=obj: obj.data.uv_layers.remove(obj.data.uv_layers[materials.UV_NAME]))
+            self.undo.append(lambda obj=obj: obj.data.uv_layers.remove(obj.data.uv_layers[UV_NAME]))
         else:
             before = scene.values_of(scene.numpy_of(), layer.data, "uv", 2)
-            self.undo.append(lambda obj=obj: obj.data.uv_layers[materials.UV_NAME].data.foreach_set("uv", before))
+            self.undo.append(lambda obj=obj: obj.data.uv_layers[UV_NAME].data.foreach_set("uv", before))
         layer.data.foreach_set("uv", uvs.ravel())
         obj.data.update()
 
     def revert(self):
-        """Everything as it was."""
+        """Restores everything."""
         for step in reversed(self.undo):
             step()
         self.undo = []
@@ -134,7 +144,7 @@ def split_off(faces, corners):
 
 
 def read_obj(path):
-    """Of each object of an OBJ its number of positions, and of the corners of its triangles the position and the UV."""
+    """Reads [number of positions, positions of corners, UVs of corners] of each object of an OBJ."""
     objects, uvs, positions, first = [], [], 0, 0
     with open(path, encoding="utf-8", errors="replace") as lines:
         for line in lines:

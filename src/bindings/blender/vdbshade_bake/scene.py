@@ -1,4 +1,4 @@
-"""The scene as the program reads it: a GLB of what casts, in the world and with Blender's axes, and a scene file."""
+"""Writes the scene for the program: a scene file, and a GLB of the casters in the world, with Blender's axes."""
 import json
 import math
 import re
@@ -8,7 +8,7 @@ import mathutils
 
 
 class BakeError(Exception):
-    """What a user has to be told, in one line."""
+    """An error for the user, in one line."""
 
 
 def numpy_of():

@@ -1,4 +1,4 @@
-"""Casters and lights: meshes and models, shapes and outlines, level sets, occluders and their parts."""
+"""Casters and lights: meshes and models, shapes and outlines, level sets and occluders."""
 from __future__ import annotations
 
 from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
@@ -7,10 +7,8 @@ import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._arrays import array, borrowed, output, pointer, transform as matrix
-from ._calls import OUT, ask, call, Handle, index_of, note, Run, Several
-from ._library import ffi, lib, Path, Unpack
-from ._structs import constant, Filled, keep, path_of, split, Struct, struct_of, structs_of, told
+from ._core import (array, ask, borrowed, call, constant, ffi, Filled, Handle, index_of, keep, lib, note, OUT, output, Path,
+                    path_of, pointer, record_of, Run, Several, split, Struct, structs_of, transform as matrix, Unpack)
 
 # --- lights
 
@@ -49,17 +47,22 @@ class Light(Struct, kind="vsh_light"):
         return f"<vdbshade.Light {self.name}: {ffi.string(text).decode()}>"
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Light) and told(self.struct) == told(other.struct)
+        return isinstance(other, Light) and record_of(self.struct) == record_of(other.struct)
 
     __hash__ = None  # type: ignore[assignment]
 
 
 def lights_of(given: Union[Light, Sequence[Light]], name: str = "lights") -> Tuple[Any, int]:
-    """Lights as C takes them: ``vsh_light[]`` and how many."""
+    """Lights as ``vsh_light[]``, and their count."""
     lights = [given] if isinstance(given, Light) else list(given)
     if not all(isinstance(light, Light) for light in lights):
         raise TypeError(f"{name}: expected a vdbshade.Light, or several in a list")
     return structs_of("vsh_light", lights), len(lights)
+
+
+def names_of(structs: Any, count: int) -> List[str]:
+    """The names of lights, ``vsh_light[]``."""
+    return [ffi.string(structs[i].name).decode() for i in range(count)]
 
 
 def lights_read(path: Path, angle: float, radius: float, unit: float = 0.0, *, run: Optional[Run] = None) -> List[Light]:
@@ -72,7 +75,7 @@ def lights_read(path: Path, angle: float, radius: float, unit: float = 0.0, *, r
     radius : float
         of points, which become spheres, and spots, world units
     unit : float
-        of the file's numbers, metres; 0: as it says itself
+        of the file's numbers, metres; 0: the file's own
     """
     lights, count = call(lib.vsh_lights_read, path_of(path, "path"), angle, radius, unit, OUT, OUT, run=run)
     return [Light._of(lights[i]) for i in range(count)]
@@ -88,7 +91,7 @@ class AlphaMask(Struct, kind="vsh_alpha_mask"):
     Parameters
     ----------
     alpha : array of uint8, shape (height, width)
-        255 is 1, row 0 on top (v = 1); used as it is where it is C-contiguous
+        255 is 1, row 0 on top (v = 1); not copied if it is C-contiguous
     wrap : pair of str
         along u and v, where UVs leave 0 … 1: "repeat", "mirror", "clamp"
     uv_transform : array of float64, shape (2, 3), optional
@@ -146,12 +149,12 @@ class Mesh(Struct, kind="vsh_mesh"):
     alpha : str
         "opaque", "masked", "blended"
     one_sided : bool
-        where it casts, light that falls on the backs of its faces comes through; methods that march voxels take no notice
+        as a caster, it lets light through that falls on the backs of its faces; methods that march voxels ignore this
     material_name : str, optional
     mask : AlphaMask, optional
-        where it is cut out
+        holes
     mask_uvs : array of float32, shape (vertices, 2), optional
-        texture coordinates for the mask, v up; what is not finite is opaque
+        texture coordinates for the mask, v up; vertices whose coordinates are not finite are opaque
 
     Notes
     -----
@@ -189,7 +192,7 @@ class Mesh(Struct, kind="vsh_mesh"):
 
     @classmethod
     def _view(cls, given: Any, owner: Any) -> "Mesh":
-        """A view of a mesh that belongs to the library. The view keeps `owner` alive."""
+        """A view of the library's mesh, which keeps `owner` alive."""
         self = cls.__new__(cls)
         self.struct, self._owner = ffi.new("vsh_mesh *", given), owner
         n, m = given.vertex_count, given.triangle_count
@@ -221,17 +224,9 @@ class Mesh(Struct, kind="vsh_mesh"):
     def __repr__(self) -> str:
         return f"<vdbshade.Mesh {self.name!r}: {len(self.positions)} vertices, {len(self.indices)} triangles>"
 
-    def matches(self, pattern: str) -> bool:
-        """Whether the mesh's name or its object's name matches a shell pattern."""
-        return bool(ask(lib.vsh_mesh_matches, self, pattern))
-
     def check(self) -> types.MeshReport:
-        """Looks it over; InputError for what is not finite or out of range."""
+        """Checks its data; InputError for numbers that are not finite or out of range."""
         return call(lib.vsh_mesh_check, self, OUT)
-
-    def uvs_usable(self, *, run: Optional[Run] = None) -> bool:
-        """Whether a lightmap can be baked by its own UVs: in the unit square, none over another."""
-        return bool(call(lib.vsh_uvs_usable, self, OUT, run=run))
 
     def measure_uvs(self, width: int, height: int) -> types.UvsMeasures:
         """How its UVs lie on its surface, in a lightmap of this size (texels)."""
@@ -242,7 +237,7 @@ Meshes = Union[Mesh, "Model", Sequence[Mesh]]
 
 
 def meshes_of(given: Meshes, name: str = "meshes") -> Tuple[Any, int]:
-    """Meshes as C takes them: ``vsh_mesh[]`` and how many."""
+    """Meshes as ``vsh_mesh[]``, and their count."""
     if isinstance(given, Mesh):
         given = [given]
     meshes = list(given) if isinstance(given, (Model, list, tuple)) else None
@@ -255,11 +250,6 @@ def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.So
     """Reports for each mesh how many of its pieces are solids, rooms and sheets, if the meshes cast together."""
     structs, count = meshes_of(meshes)
     return call(lib.vsh_mesh_solidity, structs, count, Several(count), run=run)
-
-
-def unit(name: str) -> float:
-    """Metres in a unit: "m", "cm", "mm", "in", "ft"; 0 for what is none."""
-    return ask(lib.vsh_unit, name)
 
 
 class Model(Handle, kind="vsh_model"):
@@ -318,23 +308,13 @@ class Model(Handle, kind="vsh_model"):
         """The number of UV sets of a mesh."""
         return lib.vsh_model_uv_sets(self.handle, index_of(index, len(self), "mesh"))
 
-    @property
-    def materials(self) -> List[types.ModelMaterial]:
-        """Materials of a glTF or an OBJ, as far as they decide where light comes through."""
-        return [ask(lib.vsh_model_get_material, self, i) for i in range(lib.vsh_model_material_count(self.handle))]
-
-    def mesh_material(self, index: int) -> int:
-        """The material of a mesh; -1: none."""
-        return lib.vsh_model_mesh_material(self.handle, index_of(index, len(self), "mesh"))
-
     def densities(self, rules: Mapping[str, float], path: str = "model") -> numpy.ndarray:
-        """For each of its meshes the factor of the last rule that means it, else 1: an array of float64 of shape (meshes,), as
-        unwrap() takes it.
+        """The factor of the last rule that matches each mesh, else 1: an array of float64 of shape (meshes,), for unwrap().
 
         Parameters
         ----------
         rules : mapping
-            factors by patterns of names, {"wall*": 2.0}; InputError for one that means no mesh
+            factors by patterns of names, {"wall*": 2.0}; InputError for one that matches no mesh
         path : str
             the model's, for messages
         """
@@ -342,24 +322,6 @@ class Model(Handle, kind="vsh_model"):
         call(lib.vsh_model_densities, self, path_of(path, "path"), structs_of("vsh_density_rule", rules_of(rules, "factor")), len(rules),
              factors)
         return factors
-
-    @property
-    def lights(self) -> List[types.ModelLight]:
-        """Lights of a glTF."""
-        return [ask(lib.vsh_model_get_light, self, i) for i in range(lib.vsh_model_light_count(self.handle))]
-
-    def lights_from_model(self, angle: float, radius: float, unit: float = 0.0) -> "List[Light]":
-        """Its lights as those of a scene, which have sizes.
-
-        Parameters
-        ----------
-        angle : float
-            of directional ones, angular diameter, radians
-        radius : float
-            of points and spots, world units
-        """
-        lights, count = call(lib.vsh_lights_from_model, self, angle, radius, unit, OUT, OUT)
-        return [Light._of(lights[i]) for i in range(count)]
 
 
 def rules_of(given: Mapping[str, Any], member: str) -> List[dict]:
@@ -379,13 +341,6 @@ def heights_source(values: ArrayLike, size: Sequence[float], height: float, base
 
 
 # --- procedural shapes, and outlines in a plane
-
-
-def distances_at(function: Callable[[Any, Any], float], shape: Any, positions: ArrayLike, axes: int, name: str) -> numpy.ndarray:
-    """The values of a C function that takes one point, at points (n, axes)."""
-    at = array(positions, numpy.float64, (None, axes), name)
-    first = pointer(at)
-    return numpy.array([function(shape, first + axes * i) for i in range(len(at))], numpy.float64)
 
 
 def instances_of(kind: str, given: Sequence[Any], matrix_of: Callable[[Any], Optional[numpy.ndarray]]) -> Any:
@@ -418,8 +373,8 @@ class Sdf(Struct, kind="vsh_sdf"):
     --------
     >>> plate = Sdf("box", size=(2, 0.1, 2)) - Sdf("cylinder", size=(1, 1, 1), radius=0.5)
     >>> ball = Sdf("sphere", radius=0.4).translated(0, 1, 0)
-    >>> (plate | ball).distance([[0, 1, 0]])
-    array([-0.4])
+    >>> Occluders.from_grid(Grid.from_sdf(plate | ball, voxel_size=0.02))
+    <vdbshade.Occluders …>
     """
 
     def __init__(self, shape: str = "sphere", **options: "Unpack[types.SdfNode]") -> None:
@@ -431,8 +386,7 @@ class Sdf(Struct, kind="vsh_sdf"):
     def _made(self) -> None:
         nodes = structs_of("vsh_sdf_node", self._nodes)
         self.struct = keep(ffi.new("vsh_sdf *", [nodes, len(self._nodes)]), nodes)
-        call(lib.vsh_sdf_check, self)
-
+    
     @classmethod
     def _of(cls, nodes: List[Dict[str, Any]]) -> "Sdf":
         self = cls.__new__(cls)
@@ -492,68 +446,12 @@ class Sdf(Struct, kind="vsh_sdf"):
         """The number of nodes of the tree."""
         return len(self._nodes)
 
-    def distance(self, positions: ArrayLike) -> numpy.ndarray:
-        """Signed distance, negative inside.
-
-        Parameters
-        ----------
-        positions : array of float64, shape (n, 3)
-            world units
-
-        Returns
-        -------
-        array of float64, shape (n,)
-            NaN for positions that are not finite
-        """
-        return distances_at(lib.vsh_sdf_distance, self.struct, positions, 3, "positions")
-
-    def bounds(self) -> Tuple[Tuple[float, ...], Tuple[float, ...]]:
-        """A box around the surface, world units: its least and its greatest corner."""
-        return ask(lib.vsh_sdf_bounds, self, Several(3), Several(3))
-
-
-class Solids(Handle, kind="vsh_solids"):
-    """Procedural casters as they are, for trace_shadow() and trace_ao().
-
-    Parameters
-    ----------
-    sdfs : sequence of Sdf
-    transforms : array of float64, shape (n, 3, 4), optional
-        of each, local to world, without shear or uneven scale
-    """
-
-    def __init__(self, sdfs: Sequence[Sdf], transforms: Optional[ArrayLike] = None) -> None:
-        sdfs = [sdfs] if isinstance(sdfs, Sdf) else list(sdfs)
-        if not all(isinstance(sdf, Sdf) for sdf in sdfs):
-            raise TypeError("sdfs: expected a list of vdbshade.Sdf")
-        moved = None
-        if transforms is not None:
-            moved = numpy.array([matrix(t, "transforms") for t in numpy.asarray(transforms)], numpy.float64)
-            moved = array(moved, numpy.float64, (len(sdfs), 3, 4), "transforms")
-        super().__init__(call(lib.vsh_solids_create, structs_of("vsh_sdf", sdfs), moved, len(sdfs), OUT))
-
-    def distance(self, positions: ArrayLike) -> numpy.ndarray:
-        """Signed distance to the nearest, at positions (n, 3), world units; infinite where there is none."""
-        return distances_at(lib.vsh_solids_distance, self.handle, positions, 3, "positions")
-
 
 class Outline(Handle, kind="vsh_outline"):
-    """An area of the xy-plane, bounded by closed contours; world units, y up. Made by its ``from_…`` methods."""
-
-    info: types.OutlineInfo
+    """An area of the xy-plane, bounded by closed contours; world units, y up. Made by ``from_polygons``."""
 
     def __init__(self, *arguments: Any) -> None:
-        raise TypeError("an Outline is made by Outline.from_image(), from_text(), from_polygons() or unite()")
-
-    @classmethod
-    def from_image(cls, path: Path, *, run: Optional[Run] = None, **options: "Unpack[types.MaskOptions]") -> "Outline":
-        """Where a channel of an image is at least the threshold."""
-        return cls._of(call(lib.vsh_outline_from_image, path_of(path, "path"), Filled("vsh_mask_options", options), OUT, run=run))
-
-    @classmethod
-    def from_text(cls, text: str, font: Path, *, run: Optional[Run] = None, **options: "Unpack[types.TextOptions]") -> "Outline":
-        """The letters of a text, of a font's file."""
-        return cls._of(call(lib.vsh_outline_from_text, text, path_of(font, "font"), Filled("vsh_text_options", options), OUT, run=run))
+        raise TypeError("an Outline is made by Outline.from_polygons()")
 
     @classmethod
     def from_polygons(cls, polygons: Sequence[ArrayLike], *, run: Optional[Run] = None) -> "Outline":
@@ -562,26 +460,6 @@ class Outline(Handle, kind="vsh_outline"):
         points = numpy.concatenate(parts) if parts else numpy.zeros((0, 2))
         counts = ffi.new("size_t[]", [len(p) for p in parts] or 1)
         return cls._of(call(lib.vsh_outline_from_polygons, points, counts, len(parts), OUT, run=run))
-
-    @classmethod
-    def unite(cls, outlines: "Sequence[Union[Outline, Tuple[Outline, ArrayLike]]]", *, run: Optional[Run] = None) -> "Outline":
-        """The union of outlines, or of pairs of an outline and its transform, shape (2, 3)."""
-        instances = instances_of("vsh_outline_instance", outlines, lambda moved: None if moved is None else array(
-            moved, numpy.float64, (2, 3), "transform"))
-        return cls._of(call(lib.vsh_outline_unite, instances, len(outlines), OUT, run=run))
-
-    @property
-    def contours(self) -> List[numpy.ndarray]:
-        """Each contour's points, arrays of float64 of shape (n, 2), views; the area lies to their left."""
-        found, count = [], ffi.new("size_t *")
-        for index in range(self.info.contours):
-            points = lib.vsh_outline_contour(self.handle, index, count)
-            found.append(borrowed(points, (count[0], 2), numpy.float64, self.handle))
-        return found
-
-    def distance(self, points: ArrayLike) -> numpy.ndarray:
-        """Signed distance at points (n, 2), world units, negative inside."""
-        return distances_at(lib.vsh_outline_distance, self.handle, points, 2, "points")
 
 
 # --- narrow-band level sets
@@ -593,6 +471,12 @@ Attributes = Mapping[str, str]
 def attributes_of(given: Optional[Attributes]) -> List[Dict[str, str]]:
     """Lines of text that a file carries, as members of ``vsh_attribute``."""
     return [dict(name=name, value=value) for name, value in (given or {}).items()]
+
+
+def attribute_structs(given: Optional[Attributes]) -> Tuple[Any, int]:
+    """Attributes as C has them: ``vsh_attribute[]`` and how many."""
+    lines = attributes_of(given)
+    return structs_of("vsh_attribute", lines), len(lines)
 
 
 class _Distance:
@@ -608,7 +492,7 @@ class _Distance:
 def _distances(user: Any, count: int, positions: Any, distances: Any) -> None:
     running = ffi.from_handle(user)
     result = numpy.frombuffer(ffi.buffer(distances, 8 * count), numpy.float64)
-    result[:] = numpy.nan  # what ends the call, where the function raises
+    result[:] = numpy.nan  # ends the call if the function raises
     if running.raised is None:
         # a copy, because C frees the array after the call
         at = numpy.array(numpy.frombuffer(ffi.buffer(positions, 24 * count), numpy.float64)).reshape(count, 3)
@@ -658,8 +542,8 @@ class Grid(Handle, kind="vsh_grid"):
         lipschitz : float
             bound on how much distances differ over how far positions do; 1 for true distances
         exact : bool
-            True: a true distance near the surface; False: it is measured anew, for which single positions are asked
-            for, too: ten times as long
+            True: a true distance near the surface; False: distances are measured anew, with calls for single positions:
+            ten times as long
         """
         if not callable(distance):
             raise TypeError(f"distance: expected a function, got {type(distance).__name__}")
@@ -691,8 +575,7 @@ class Grid(Handle, kind="vsh_grid"):
 
     def write(self, path: Path, name: Optional[str] = None, attributes: Optional[Attributes] = None) -> None:
         """Writes a .vdb file, whole or not at all; `name` None: "surface"."""
-        lines = attributes_of(attributes)
-        call(lib.vsh_grid_write, self, path_of(path, "path"), name, structs_of("vsh_attribute", lines), len(lines))
+        call(lib.vsh_grid_write, self, path_of(path, "path"), name, *attribute_structs(attributes))
 
     def values(self, index_min: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None,
                out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
@@ -735,50 +618,17 @@ def vdb_list(path: Path, *, run: Optional[Run] = None) -> List[types.VdbEntry]:
         entries = ffi.new("vsh_vdb_entry[]", capacity)
         call(lib.vsh_vdb_list, path_of(path, "path"), entries, capacity, count, run=run)
         if count[0] <= capacity:
-            return [told(entries[i]) for i in range(count[0])]
+            return [record_of(entries[i]) for i in range(count[0])]
         capacity = count[0]
 
 
-def vdb_copy(path: Path, index_min: Sequence[int], shape: Sequence[int], name: Optional[str] = None, *,
-             run: Optional[Run] = None) -> Tuple[numpy.ndarray, numpy.ndarray]:
-    """Values of a grid of numbers of a .vdb file, and where it is active: two arrays of float32 (depth, height, width),
-    from the voxel `index_min` (x, y, z) on; `name` None: the first such grid."""
-    active = numpy.empty(tuple(int(n) for n in shape), numpy.float32)
-    values = dense(None, index_min, shape, None, lambda *box: call(lib.vsh_vdb_copy, path_of(path, "path"), name, *box, active, run=run))
-    return values, active
-
-
-# --- occluders, and the parts that marches and rays meet
-
-
-class Triangles(Handle, kind="vsh_triangles"):
-    """Triangles of meshes in a tree for rays; the meshes need not outlive it."""
-
-    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None) -> None:
-        super().__init__(call(lib.vsh_triangles_create, *meshes_of(meshes), OUT, run=run))
-
-    @property
-    def bytes(self) -> int:
-        """In memory."""
-        return ask(lib.vsh_triangles_bytes, self)
+# --- occluders and their fields
 
 
 class Field(Handle, kind="vsh_field"):
-    """The pyramid of narrow bands that shadow marching samples, of a grid.
-
-    Parameters
-    ----------
-    grid : Grid
-    reach : float
-        largest distance that must be told apart, world units; 0: four times the diagonal of the solid's box
-    surface : bool
-        extract the surface, for rays
-    """
+    """The pyramid of narrow bands that shadow marching samples. Belongs to Occluders."""
 
     info: types.FieldInfo
-
-    def __init__(self, grid: Grid, *, run: Optional[Run] = None, **options: "Unpack[types.FieldOptions]") -> None:
-        super().__init__(call(lib.vsh_field_create, grid, Filled("vsh_field_options", options), OUT, run=run))
 
     def sample(self, positions: ArrayLike, out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
         """Signed distance.
@@ -799,110 +649,6 @@ class Field(Handle, kind="vsh_field"):
         lib.vsh_field_sample(self.handle, len(at), pointer(at), pointer(distances))
         return distances
 
-    def find_lost(self, meshes: Meshes, triangles: Optional[Triangles] = None) -> List[types.Lost]:
-        """Finds the parts of its meshes that it does not hold: a record for each mesh."""
-        structs, count = meshes_of(meshes)
-        return call(lib.vsh_field_find_lost, self, structs, count, optional(triangles, "vsh_triangles"), Several(count))
-
-
-class Heights(Handle, kind="vsh_heights"):
-    """A heightfield that casts as it is, without voxels; arguments as of Model.from_heights()."""
-
-    info: types.HeightsInfo
-
-    def __init__(self, values: ArrayLike, *, size: Sequence[float] = (1.0, 1.0), height: float = 1.0, base: float = 0.0,
-                 transform: Optional[ArrayLike] = None, name: str = "heights", run: Optional[Run] = None) -> None:
-        super().__init__(call(lib.vsh_heights_create, heights_source(values, size, height, base, transform, name), OUT, run=run))
-
-
-class Spheres(Handle, kind="vsh_spheres"):
-    """Spheres that cast as they are, without voxels.
-
-    Parameters
-    ----------
-    spheres : array of float64, shape (n, 4)
-        x, y, z, radius, world units
-    transform : array of float64, shape (3, 4), optional
-    """
-
-    info: types.SpheresInfo
-
-    def __init__(self, spheres: ArrayLike, transform: Optional[ArrayLike] = None, *, run: Optional[Run] = None) -> None:
-        balls = array(spheres, numpy.float64, (None, 4), "spheres")
-        super().__init__(call(lib.vsh_spheres_create, balls, len(balls), matrix(transform), OUT, run=run))
-
-
-def spheres_read(path: Path, *, run: Optional[Run] = None) -> numpy.ndarray:
-    """Spheres of a CSV file: an array of float64 of shape (n, 4), x, y, z and radius."""
-    spheres, count = call(lib.vsh_spheres_read, path_of(path, "path"), OUT, OUT, run=run)
-    owned = ffi.gc(spheres, lib.vsh_spheres_list_free)
-    return numpy.frombuffer(ffi.buffer(owned, 32 * count), numpy.float64).reshape(-1, 4).copy()
-
-
-def optional(given: Any, kind: str, name: Optional[str] = None) -> Any:
-    """The C pointer of an argument that may be None."""
-    return ffi.NULL if given is None else struct_of(given, ffi.typeof(kind), name)
-
-
-def _trace(function: Any, triangles: Optional[Triangles], solids: Optional[Solids], positions: ArrayLike, normals: Optional[ArrayLike],
-           out: Optional[numpy.ndarray], run: Optional[Run], *how: Any) -> numpy.ndarray:
-    at = array(positions, numpy.float64, (None, 3), "positions")
-    up = None if normals is None else array(normals, numpy.float32, (len(at), 3), "normals")
-    values = output(out, numpy.float32, (len(at),), "out")
-    call(function, optional(triangles, "vsh_triangles"), optional(solids, "vsh_solids"), len(at), at, up, *how, values, run=run)
-    return values
-
-
-def trace_shadow(positions: ArrayLike, normals: Optional[ArrayLike], light: Light, *, triangles: Optional[Triangles] = None,
-                 solids: Optional[Solids] = None, lift: float = 0.0, rays: int = 256, out: Optional[numpy.ndarray] = None,
-                 run: Optional[Run] = None) -> numpy.ndarray:
-    """Fraction of a light that points see, by rays: the truth for other methods.
-
-    Parameters
-    ----------
-    positions : array of float64, shape (n, 3)
-        world units
-    normals : array of float32, shape (n, 3), optional
-        unit; None: no horizon
-    lift : float
-        world units above the point, where rays begin
-    rays : int
-        a point, 1 … 65536
-
-    Returns
-    -------
-    array of float32, shape (n,)
-    """
-    return _trace(lib.vsh_trace_shadow, triangles, solids, positions, normals, out, run, lift, light, rays)
-
-
-def trace_ao(positions: ArrayLike, normals: ArrayLike, distance: float, *, triangles: Optional[Triangles] = None,
-             solids: Optional[Solids] = None, lift: float = 0.0, rays: int = 256, out: Optional[numpy.ndarray] = None,
-             run: Optional[Run] = None) -> numpy.ndarray:
-    """Cosine-weighted fraction of the hemisphere that is free within a distance, world units; else as trace_shadow()."""
-    return _trace(lib.vsh_trace_ao, triangles, solids, positions, numpy.asarray(normals), out, run, lift, distance, rays)
-
-
-class Layer(Struct, kind="vsh_layer"):
-    """Casters that are shaded in a way of their own: a part of Occluders.from_parts().
-
-    Parameters
-    ----------
-    casters : Field, Heights or Spheres
-    triangles : Triangles, optional
-        of a field's casters, for exact methods
-    lights : sequence of str, optional
-        names of the lights it casts for; None: all
-    **options
-        members of ``vsh_layer`` (vdbshade.types.Layer): method, combine, softness, remap, start_offset, ao, name
-    """
-
-    def __init__(self, casters: Any, *, triangles: Optional[Triangles] = None, lights: Optional[Sequence[str]] = None,
-                 **options: "Unpack[types.Layer]") -> None:
-        if not isinstance(casters, (Field, Heights, Spheres)):
-            raise TypeError(f"casters: expected a Field, Heights or Spheres, got {type(casters).__name__}")
-        self.struct = Filled("vsh_layer", options, triangles=triangles, lights=lights, **{casters.KIND[len("vsh_") :]: casters}).struct
-
 
 class Occluders(Handle, kind="vsh_occluders"):
     """Everything that casts shadows. Points, lightmaps, volumes, pictures and distances are computed from it.
@@ -910,7 +656,7 @@ class Occluders(Handle, kind="vsh_occluders"):
     Parameters
     ----------
     meshes : Mesh, Model or sequence of Mesh
-        their triangles are kept, and where voxels are asked for, a level set is made of them
+        their triangles are kept; with a resolution or voxel size, they also become a level set
     **options
         ``reach``, ``triangles`` (False: voxels alone) of vdbshade.types.OccludersOptions; ``voxel_size``,
         ``resolution``, ``half_width``, ``shell_thickness`` of vdbshade.types.GridOptions. Without a resolution or a
@@ -924,20 +670,15 @@ class Occluders(Handle, kind="vsh_occluders"):
         super().__init__(call(lib.vsh_occluders_create, *meshes_of(meshes), Filled("vsh_occluders_options", mine, grid=grid), OUT, run=run))
 
     @classmethod
-    def from_grid(cls, grid: Grid, *, run: Optional[Run] = None, **options: "Unpack[types.FieldOptions]") -> "Occluders":
-        """Casters made of a level set: of a .vdb file, a function or a procedural tree."""
-        return cls._of(call(lib.vsh_occluders_from_grid, grid, Filled("vsh_field_options", options), OUT, run=run))
-
-    @classmethod
-    def from_parts(cls, field: Optional[Field] = None, *, triangles: Optional[Triangles] = None, layers: Sequence[Layer] = (),
-                   true_triangles: Optional[Triangles] = None, true_solids: Optional[Solids] = None,
-                   voxel_size: float = 0.0) -> "Occluders":
-        """Casters made of a field, triangles and layers. Errors are measured against true_triangles and true_solids."""
-        parts = Filled("vsh_occluder_parts", field=field, triangles=triangles, layers=layers, true_triangles=true_triangles,
-                       true_solids=true_solids, voxel_size=voxel_size)
-        return cls._of(call(lib.vsh_occluders_from_parts, parts, OUT, keeps=parts.keeps))
+    def from_grid(cls, grid: Grid, *, run: Optional[Run] = None, **options: "Unpack[types.OccludersOptions]") -> "Occluders":
+        """Casters made of a level set: of a .vdb file, a function or a procedural tree. Options: ``reach``, ``grown``."""
+        return cls._of(call(lib.vsh_occluders_from_grid, grid, Filled("vsh_occluders_options", options), OUT, run=run))
 
     @property
-    def field(self) -> Field:
-        """Its field, which lives as long as anything that refers to either."""
-        return Field._borrow(ask(lib.vsh_occluders_get_parts, self, OUT).field, self.handle)
+    def field(self) -> Optional[Field]:
+        """The field of its casters in no layer, which keeps them alive; None if they have no voxels."""
+        return self.layer_field(None)
+
+    def layer_field(self, layer: Optional[str]) -> Optional[Field]:
+        """The field of a scene's layer."""
+        return Field._borrow(ask(lib.vsh_occluders_get_field, self, layer), self.handle)

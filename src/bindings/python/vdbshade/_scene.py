@@ -8,20 +8,18 @@ import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._arrays import array, borrowed, output, pointer, transform as matrix, vector
-from ._calls import OUT, ask, call, Handle, index_of, note, Run
-from ._casters import (Attributes, attributes_of, distances_at, Grid, Heights, Light, lights_of, Mesh, Meshes, meshes_of, Model,
-                       Occluders, optional, Outline, rules_of, Sdf, Solids, Spheres, Triangles)
-from ._library import ffi, lib, Path, text, Unpack
+from ._core import (array, ask, borrowed, call, constant, ffi, Filled, Handle, index_of, keep, lib, note, OUT, output, pairs_of,
+                    Path, path_of, pointer, record_of, Run, Struct, structs_of, text, texts_of, transform as matrix,
+                    Unpack, vector, words_of_bits)
+from ._casters import (Attributes, attributes_of, Grid, Light, lights_of, Mesh, Meshes, meshes_of, Model, names_of, Occluders, rules_of, Sdf)
 from ._shading import Charts, Planes
-from ._structs import constant, Filled, keep, pairs_of, path_of, Struct, struct_of, structs_of, texts_of, told, words_of_bits
 from ._tables import WORDS
 
 # --- lightmap UVs, assets with their light, and pages that show them
 
 
 class AtlasMesh:
-    """One mesh as it lies in the atlas; arrays are views.
+    """One mesh in the atlas; arrays are views.
 
     Attributes
     ----------
@@ -53,26 +51,22 @@ class AtlasMesh:
 
 
 class Atlas(Handle, kind="vsh_atlas"):
-    """Charts of meshes, packed into pages. A sequence of AtlasMesh."""
+    """Charts of meshes, packed into ``info.pages`` pages. A sequence of AtlasMesh."""
 
     info: types.AtlasInfo
 
-    @property
-    def pages(self) -> int:
-        return ask(lib.vsh_atlas_page_count, self)
-
     def page(self, index: int) -> types.AtlasPage:
         """A page's size in texels, its texels_per_unit, the covered share and its first mesh."""
-        return ask(lib.vsh_atlas_page_view, self, index_of(index, self.pages, "page", "the atlas has"))
+        return ask(lib.vsh_atlas_page_view, self, index_of(index, self.info.pages, "page", "the atlas has"))
 
     @property
     def charts(self) -> List[types.AtlasChart]:
         """All charts: page, mesh, stretch, area and the texels that each touches."""
         charts = lib.vsh_atlas_charts(self.handle)
-        return [told(charts[i]) for i in range(lib.vsh_atlas_chart_count(self.handle))]
+        return [record_of(charts[i]) for i in range(self.info.charts)]
 
     def __len__(self) -> int:
-        return ask(lib.vsh_atlas_mesh_count, self)
+        return self.info.meshes
 
     def __getitem__(self, index: int) -> AtlasMesh:
         view = lib.vsh_atlas_mesh_view(self.handle, index_of(index, len(self), "mesh", "the atlas has"))
@@ -135,14 +129,14 @@ def lit_write(output: Path, model: Model, images: Sequence[LitImage], *, path: O
     Parameters
     ----------
     model : Model
-        what was read of `path`
+        the model in `path`
     images : sequence of LitImage
     path : path, optional
-        the model's file: a glTF is given back as it was; None: a document is made of the model
+        the model's file: a glTF is kept whole; None: a document is made of the model
     atlas : Atlas, optional
         new UVs of the model's meshes; None: they have their lightmap in a set of their own
     uv_sets : sequence of int, optional
-        without an atlas: the set of each mesh; -1: it stays unlit; None: as Model.mesh() takes it
+        without an atlas: the set of each mesh; -1: it stays unlit; None: as Model.mesh() chooses
     image_place : str
         "auto", "embed", "beside"
     """
@@ -193,11 +187,11 @@ def view_write(path: Path, model: Path, planes: Any = (), *, uv_set: int = -1,
 
 
 def settings() -> List[types.Setting]:
-    """All settings of scenes, of what receives in them and of flat scenes, with their help, range and default."""
+    """All settings of scenes, receivers and flat scenes, with their help, range and default."""
     found: List[types.Setting] = []
     setting = ffi.new("vsh_setting *")
     while lib.vsh_setting_get(len(found), setting):
-        found.append(told(setting))
+        found.append(record_of(setting))
     return found
 
 
@@ -279,7 +273,7 @@ class Scene(SceneFile, kind="vsh_scene"):
     Parameters
     ----------
     path : path, optional
-        a scene's JSON file; what else is given is put over it
+        a scene's JSON file; other arguments override it
     casters : sequence, optional
         each a path (.vdb or a mesh), an Sdf, or a dict of members of ``vsh_caster`` (vdbshade.types.Caster);
         `solidity` a mapping as below, `one_sided` patterns
@@ -287,8 +281,10 @@ class Scene(SceneFile, kind="vsh_scene"):
         each a mesh's path, or a dict of members of ``vsh_receiver`` (vdbshade.types.Receiver): path, output, width, …;
         `density` a mapping of patterns to factors of texels_per_unit, {"wall*": 2.0}
     lights : sequence of Light, optional
+    layers : sequence of dict, optional
+        members of ``vsh_scene_layer`` (vdbshade.types.SceneLayer): name, softness, method, …; casters name their `layer`
     solidity : mapping, optional
-        what meshes are taken for, by patterns: {"wall*": "shell"}
+        how meshes cast, by patterns: {"wall*": "shell"}
     **settings
         by the names of the command line's options (settings()): max_error=0.01, ao_distance=1, width=512. Those of
         receivers are of all of them
@@ -301,7 +297,8 @@ class Scene(SceneFile, kind="vsh_scene"):
 
     def __init__(self, path: Optional[Path] = None, *, casters: Optional[Sequence[Any]] = None,
                  receivers: Optional[Sequence[Any]] = None, lights: Optional[Sequence[Light]] = None,
-                 solidity: Optional[Mapping[str, str]] = None, run: Optional[Run] = None, **settings: Any) -> None:
+                 layers: "Optional[Sequence[types.SceneLayer]]" = None, solidity: Optional[Mapping[str, str]] = None,
+                 run: Optional[Run] = None, **settings: Any) -> None:
         self._read(lib.vsh_scene_read, path, run)
         given: dict = {}
         given["receivers"] = [self.struct.receivers + i for i in range(self.struct.receiver_count)] if receivers is None else [
@@ -310,13 +307,14 @@ class Scene(SceneFile, kind="vsh_scene"):
         if lights is not None:
             given["lights"], given["light_count"] = lights_of(lights)
             given["light_file_count"] = 0  # none of these are a file's
+        given["layers"] = layers
         given["solidity"] = None if solidity is None else rules_of(solidity, "solidity")
         self._filled.fill(given)
         for name, value in settings.items():
             self.set(name, value)
 
     def set(self, name: str, value: Any) -> None:
-        """Sets what a setting's key ("ao.method") or option ("ao_method") says, as settings() lists them; of receivers all."""
+        """Sets a setting by its key ("ao.method") or option ("ao_method"), as settings() lists them, for all receivers."""
         owners = {s.owner for s in known_settings(name, ("scene", "receiver"))}
         given = self._filled.text(setting_text(value), name)
         if "scene" in owners:
@@ -330,38 +328,23 @@ class Scene(SceneFile, kind="vsh_scene"):
 
     @property
     def light_files(self) -> List[types.LightFile]:
-        """Files that its file takes lights from, and which of its lights they are."""
-        return [told(self.struct.light_files[i]) for i in range(self.struct.light_file_count)]
+        """Files that its file reads lights from, and their lights' places among its own."""
+        return [record_of(self.struct.light_files[i]) for i in range(self.struct.light_file_count)]
 
     @property
     def layers(self) -> List[str]:
         """Names of its layers."""
         return [ffi.string(self.struct.layers[i].name).decode() for i in range(self.struct.layer_count)]
 
-    def _layer(self, name: Optional[str]) -> Any:
-        if name is None:
-            return ffi.NULL
-        if name not in self.layers:
-            raise KeyError(f"no layer {name!r}; there are {', '.join(self.layers)}")
-        return self.struct.layers + self.layers.index(name)
-
-    # --- what is asked of it
-
-    def traceable(self, layer: Optional[str] = None) -> bool:
-        """Whether the casters in a layer, or in none, are all triangles."""
-        return bool(ask(lib.vsh_scene_traceable, self, self._layer(layer)))
-
-    def marches(self, layer: Optional[str] = None) -> bool:
-        """Whether a method knows its casters by their voxels alone."""
-        return bool(ask(lib.vsh_scene_marches, self, self._layer(layer)))
+    # --- queries
 
     def check_outputs(self, outputs: Sequence[Path], *, run: Optional[Run] = None) -> None:
-        """ArgumentError where one of these files is there already and is read with the scene: a texture, say."""
+        """ArgumentError if one of these files exists and is an input of the scene, such as a texture."""
         paths = list(outputs)
         call(lib.vsh_scene_check_outputs, self, texts_of(paths, "outputs"), len(paths), run=run)
 
     def receiver_check(self, index: int) -> None:
-        """ArgumentError and the like where a receiver's image could not be written as it asks."""
+        """Raises an error if a receiver's image could not be written by its settings."""
         call(lib.vsh_receiver_check, self, index)
 
     def receiver_charts(self, index: int, meshes: Meshes, *, run: Optional[Run] = None) -> Charts:
@@ -378,10 +361,6 @@ class Scene(SceneFile, kind="vsh_scene"):
             raise IndexError(f"receiver {index}: there are {self.struct.receiver_count}")
         return bool(call(lib.vsh_receiver_needs_unwrap, self._receiver(index), *meshes_of(meshes), OUT, run=run))
 
-    def reach(self, grid: Grid, receivers_min: ArrayLike, receivers_max: ArrayLike) -> float:
-        """Reach, world units, that a field of `grid` needs for receivers in a world box."""
-        return ask(lib.vsh_scene_reach, self, grid, vector(receivers_min, 3, "receivers_min"), vector(receivers_max, 3, "receivers_max"))
-
     def view(self, path: Path, name: str = "scene", *, run: Optional[Run] = None) -> None:
         """Writes a page that shows the surface of its casters' voxels, with shadow, AO and light at the vertices
         (docs/view.md). `name` is shown."""
@@ -393,7 +372,7 @@ class Scene(SceneFile, kind="vsh_scene"):
 
 
 class Assets(Handle, kind="vsh_assets"):
-    """What a scene's files hold, each file read once."""
+    """The contents of a scene's files, each file read once."""
 
     def __init__(self, scene: Scene, *, run: Optional[Run] = None) -> None:
         super().__init__(call(lib.vsh_assets_load, scene, OUT, run=run))
@@ -404,71 +383,21 @@ class Assets(Handle, kind="vsh_assets"):
         meshes = ask(function, self, *which, count)
         return [Mesh._view(meshes[i], self.handle) for i in range(count[0])]
 
-    def receiver(self, index: int, page: Optional[int] = None) -> List[Mesh]:
-        """The meshes of a receiver, of one of its pages; none beyond what there is."""
-        if page is None:
-            return self._meshes(lib.vsh_assets_receiver, index)
-        return self._meshes(lib.vsh_assets_receiver_page, index, page, ffi.new("size_t *"))
+    def receiver(self, index: int) -> List[Mesh]:
+        """The meshes of a receiver; empty beyond the last."""
+        return self._meshes(lib.vsh_assets_receiver, index)
 
     def caster(self, index: int) -> List[Mesh]:
         """The meshes of a caster; none of one without triangles."""
         return self._meshes(lib.vsh_assets_caster, index)
 
-    def receiver_pages(self, index: int) -> int:
-        return ask(lib.vsh_assets_receiver_pages, self, index)
-
-    def receiver_page_info(self, index: int, page: int) -> Optional[types.ReceiverPage]:
-        """A page of a receiver: width and height (texels), and the object whose it is, None where it is shared; None beyond
-        what there is."""
-        found = ffi.new("vsh_receiver_page *")
-        return told(found) if ask(lib.vsh_assets_receiver_page_info, self, index, page, found) else None
-
-    def _with_numbers(self, function: Any, kind: Any, index: int) -> Any:
-        numbers = ffi.new("size_t **")
-        found = kind._borrow(ask(function, self, index, numbers), self.handle)
-        return None if found is None else (found, [numbers[0][i] for i in range(len(self.receiver(index)))])
-
-    def receiver_model(self, index: int) -> Optional[Tuple[Model, List[int]]]:
-        """The model of a receiver, and which of its meshes each of receiver() is."""
-        return self._with_numbers(lib.vsh_assets_receiver_model, Model, index)
-
-    def receiver_atlas(self, index: int) -> Optional[Tuple[Atlas, List[int]]]:
-        """Where it is unwrapped: its atlas, and which of the atlas's meshes each of receiver() is."""
-        return self._with_numbers(lib.vsh_assets_receiver_atlas, Atlas, index)
-
-    def heights(self, index: int) -> Optional[Heights]:
-        """What a caster casts by that is a direct heightfield."""
-        return Heights._borrow(ask(lib.vsh_assets_heights, self, index), self.handle)
-
-    def spheres(self, index: int) -> Optional[Spheres]:
-        """What a caster casts by that is spheres without voxels."""
-        return Spheres._borrow(ask(lib.vsh_assets_spheres, self, index), self.handle)
-
-    # --- what casts
-
-    def casters(self, layer: Optional[str] = None, *, only_layer: bool = False, run: Optional[Run] = None) -> Optional[Grid]:
-        """All voxelised casters as one level set; of a layer (or with only_layer of none) those in it, None where there
-        are none."""
-        if layer is None and not only_layer:
-            return Grid._of(call(lib.vsh_scene_casters, self.scene, self, OUT, run=run))
-        return Grid._of(call(lib.vsh_scene_layer_casters, self.scene, self, self.scene._layer(layer), OUT, run=run))
-
-    def triangles(self, layer: Optional[str] = None, *, run: Optional[Run] = None) -> Optional[Triangles]:
-        """The triangles of the casters in a layer, or in none."""
-        return Triangles._of(call(lib.vsh_scene_triangles, self.scene, self, self.scene._layer(layer), OUT, run=run))
-
-    def truth(self, *, run: Optional[Run] = None) -> Tuple[Optional[Triangles], Optional[Solids]]:
-        """Its casters as rays meet them."""
-        triangles, solids = call(lib.vsh_scene_truth, self.scene, self, OUT, OUT, run=run)
-        return Triangles._of(triangles), Solids._of(solids)
-
-    def resolution(self, points: float, layer: Optional[str] = None) -> int:
-        """Voxels along the longest side that are chosen for so many points; -1: those that the scene names, 0: none."""
-        return ask(lib.vsh_scene_resolution, self.scene, self, self.scene._layer(layer), points)
+    def casters(self, *, run: Optional[Run] = None) -> Grid:
+        """All voxelised casters, in all layers, as one level set."""
+        return Grid._of(call(lib.vsh_scene_casters, self.scene, self, OUT, run=run))
 
     def occluders(self, *, receivers_min: Optional[ArrayLike] = None, receivers_max: Optional[ArrayLike] = None,
                   grid: Optional[Grid] = None, run: Optional[Run] = None, **options: Any) -> Occluders:
-        """What casts in the scene; options of vdbshade.types.SceneOccludersOptions: voxels, points, within, truth."""
+        """The scene's casters; options of vdbshade.types.SceneOccludersOptions: voxels, points, within, truth."""
         filled = Filled("vsh_scene_occluders_options", options, grid=grid)
         for name, corner in (("receivers_min", receivers_min), ("receivers_max", receivers_max)):
             filled.fill({name: None if corner is None else vector(corner, 3, name)})
@@ -526,7 +455,7 @@ def _add_rows(user: Any, lightmap: Any, image: Any, first: int, count: int, plan
     if first == 0:
         shape = (lightmap.height, lightmap.width)
         running.maps.append(SceneLightmap((name, numpy.empty(shape, numpy.float32)) for name in names))
-        running.maps[-1].told = told(lightmap)
+        running.maps[-1].told = record_of(lightmap)
         running.maps[-1].told.meshes = None
     for i, name in enumerate(names):
         plane = running.maps[-1][name]
@@ -543,8 +472,8 @@ def _bake(function: Any, scene: Scene, arrays: bool, run: Optional[Run], options
     errors = ffi.new("vsh_bake_error[]", scene.struct.light_count + 2 if isinstance(scene, Scene) else 2)
     report = ffi.new("vsh_bake_report *", {"errors": errors})
     call(function, scene, filled, report, run=run, watched=rows)
-    made = told(report)
-    made.errors = [told(errors[i]) for i in range(len(errors))]
+    made = record_of(report)
+    made.errors = [record_of(errors[i]) for i in range(len(errors))]
     return SceneBake(made, rows.maps)
 
 
@@ -583,8 +512,8 @@ def forecast_scene(scene: Scene, *, run: Optional[Run] = None, **options: Any) -
 
 
 def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) -> List[str]:
-    """The words that were kept in the first part that is there, of `shard_count` shards (0: as many as there are). A part is
-    whatever somebody has put there: words are text that its writer chose."""
+    """The words stored in the first existing part of `shard_count` shards (0: as many as there are). Do not trust them: anybody may
+    have written the part."""
     words, count = call(lib.vsh_part_words, path_of(parts, "parts"), shard_count, OUT, OUT, run=run)
     owned = ffi.gc(words, lib.vsh_part_words_free)
     return [text(owned[i]) or "" for i in range(count)]
@@ -593,11 +522,6 @@ def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) 
 def version() -> str:
     """The library's, "0.2.0"."""
     return ask(lib.vsh_version)
-
-
-def isa_available(isa: str) -> bool:
-    """Whether this machine has an instruction set: "base", "avx2", "avx512"."""
-    return bool(lib.vsh_isa_available(constant("VSH_ISA_", isa, "isa")))
 
 
 def file_digest(path: Path, *, run: Optional[Run] = None) -> str:
@@ -623,61 +547,7 @@ def provenance(scene: Optional[Scene] = None, *, files: Sequence[Path] = (), com
     return pairs_of(lib.vsh_provenance_attributes(made, count), count[0])
 
 
-def provenance_max_error(attributes: Mapping[str, str], channel: str) -> float:
-    """The standard error that a channel was made to, as a file's attributes say; NaN where they don't."""
-    lines = attributes_of(attributes)
-    return ask(lib.vsh_provenance_max_error, structs_of("vsh_attribute", lines), len(lines), channel)
-
-
 # --- flat scenes: light maps of a plane
-
-
-def flat_bake(casters: Optional[Outline], lights: Union[Light, Sequence[Light]] = (), *, irradiance: bool = False,
-              out: Optional[Mapping[str, numpy.ndarray]] = None, run: Optional[Run] = None,
-              **options: "Unpack[types.FlatOptions]") -> Dict[str, numpy.ndarray]:
-    """Bakes a light map of a plane.
-
-    Parameters
-    ----------
-    casters : Outline, optional
-        None: an empty plane
-    lights : Light or sequence of Light
-        third components are ignored
-    irradiance : bool
-        "irradiance.R", ".G", ".B" too
-    **options
-        vdbshade.types.FlatOptions: width, height, region_min, region_max, method, supersample, padding
-
-    Returns
-    -------
-    dict
-        arrays of float32 of shape (height, width), row 0 on top: "shadow.NAME" of each light, "A" (coverage)
-    """
-    return _bake_flat(casters, *lights_of(lights), Filled("vsh_flat_options", options).struct, irradiance, out, run)
-
-
-def _bake_flat(casters: Optional[Outline], structs: Any, count: int, options: Any, irradiance: bool,
-          out: Optional[Mapping[str, numpy.ndarray]], run: Optional[Run]) -> Dict[str, numpy.ndarray]:
-    names = [f"shadow.{ffi.string(structs[i].name).decode()}" for i in range(count)]
-    wanted = names + ["A"] + ([f"irradiance.{c}" for c in "RGB"] if irradiance else [])
-    unknown = set(out or {}) - set(wanted)
-    if unknown or len(set(names)) != len(names):
-        raise ValueError(f"out {sorted(unknown)}: there are {', '.join(wanted)}" if unknown else "lights: two of one name")
-    shape = (max(options.height, 0), max(options.width, 0))
-    if max(shape) > 65536:
-        shape = (0, 0)  # refused by the library, which says why
-    planes = {n: output((out or {}).get(n), numpy.float32, shape, f"out[{n!r}]") for n in wanted}
-    shadow = ffi.new("float *[]", [pointer(planes[n]) for n in names] or 1)
-    colour = ffi.new("float *[3]", [pointer(planes[f"irradiance.{c}"]) for c in "RGB"]) if irradiance else ffi.NULL
-    target = ffi.new("vsh_flat_map *", [shadow, colour, pointer(planes["A"])])
-    call(lib.vsh_flat_bake, optional(casters, "vsh_outline", "casters"), structs, count, options, target, run=run)
-    return planes
-
-
-def flat_visibility(casters: Optional[Outline], light: Light, points: ArrayLike) -> numpy.ndarray:
-    """The share of a light that points (n, 2) see, exactly: float64 of shape (n,)."""
-    outline, struct = optional(casters, "vsh_outline", "casters"), struct_of(light, ffi.typeof("vsh_light"))
-    return distances_at(lambda shape, at: lib.vsh_flat_visibility(shape, struct, at), outline, points, 2, "points")
 
 
 def flat_light_name(type: int) -> Optional[str]:
@@ -694,7 +564,7 @@ class FlatScene(SceneFile, kind="vsh_flat_scene"):
             self.set(name, value)
 
     def set(self, name: str, value: Any) -> None:
-        """Sets what a setting's key or option says."""
+        """Sets a setting by its key or option."""
         known_settings(name, ("flat",))
         call(lib.vsh_flat_scene_set, self, option_of(name), self._filled.text(setting_text(value), name))
 
@@ -702,14 +572,32 @@ class FlatScene(SceneFile, kind="vsh_flat_scene"):
     def shape(self) -> Tuple[int, int]:
         return self.struct.options.height, self.struct.options.width
 
-    def casters(self, *, run: Optional[Run] = None) -> Optional[Outline]:
-        """The union of its casters; None where it has none."""
-        return Outline._of(call(lib.vsh_flat_scene_casters, self, OUT, run=run))
+    def bake(self, *, irradiance: bool = True, out: Optional[Mapping[str, numpy.ndarray]] = None,
+             run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
+        """Bakes its light map.
 
-    def bake(self, *, irradiance: bool = True, run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
-        """As flat_bake()."""
-        return _bake_flat(self.casters(run=run), self.struct.lights, self.struct.light_count, ffi.addressof(self.struct, "options"),
-                     irradiance, None, run)
+        Parameters
+        ----------
+        irradiance : bool
+            "irradiance.R", ".G", ".B" too
+        out : mapping, optional
+            arrays of float32, of `shape`, that planes are written into, by their names
+
+        Returns
+        -------
+        dict
+            arrays of float32 of shape (height, width), row 0 on top: "shadow.NAME" of each light, "A" (coverage)
+        """
+        names = [f"shadow.{name}" for name in names_of(self.struct.lights, self.struct.light_count)]
+        wanted = names + ["A"] + ([f"irradiance.{c}" for c in "RGB"] if irradiance else [])
+        unknown = set(out or {}) - set(wanted)
+        if unknown:
+            raise ValueError(f"out {sorted(unknown)}: there are {', '.join(wanted)}")
+        planes = {n: output((out or {}).get(n), numpy.float32, self.shape, f"out[{n!r}]") for n in wanted}
+        shadow = ffi.new("float *[]", [pointer(planes[n]) for n in names] or 1)
+        colour = ffi.new("float *[3]", [pointer(planes[f"irradiance.{c}"]) for c in "RGB"]) if irradiance else ffi.NULL
+        call(lib.vsh_flat_bake, self, ffi.new("vsh_flat_map *", [shadow, colour, pointer(planes["A"])]), run=run)
+        return planes
 
 
 # --- comparing baked values with golden ones
@@ -723,13 +611,11 @@ class Measures(types.Measures):
     "p99" and "max"; NaN if a measure does not apply."""
 
     value: Dict[str, float]  # type: ignore[assignment]
-    _struct: Any
 
 
 def _measures(struct: Any) -> Measures:
-    found = Measures(**told(struct).__dict__)
+    found = Measures(**record_of(struct).__dict__)
     found.value = dict(zip(MEASURES, struct.value))
-    found._struct = ffi.new("vsh_measures *", struct)
     return found
 
 
@@ -756,24 +642,13 @@ def compare(golden: ArrayLike, values: ArrayLike, mask: Optional[ArrayLike] = No
     ----------
     golden, values : array of float32, shape (height, width) or (depth, height, width)
     mask : array of bool or uint8, of that shape, optional
-        compared where it is not 0
+        compares only nonzero texels
     **options
         vdbshade.types.CompareOptions
     """
     measures = ffi.new("vsh_measures *")
     call(lib.vsh_compare, _compared(golden, values, mask), Filled("vsh_compare_options", options), measures, run=run)
     return _measures(measures[0])
-
-
-def compare_coverage(golden: Optional[ArrayLike], values: Optional[ArrayLike]) -> Tuple[types.Coverage, numpy.ndarray]:
-    """Compares two planes of coverage (covered above 1/2; None: everywhere), and where both are covered: uint8 of their shape."""
-    planes = [None if p is None else numpy.asarray(p) for p in (golden, values)]
-    shape = next((p.shape for p in planes if p is not None), None)
-    if shape is None:
-        raise TypeError("golden, values: expected an array for one of them")
-    given = [None if p is None else array(p, numpy.float32, shape, "coverage") for p in planes]
-    mask = numpy.empty(shape, numpy.uint8)
-    return ask(lib.vsh_compare_coverage, mask.size, *given, mask, OUT), mask
 
 
 def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], masks: Optional[Sequence[ArrayLike]] = None, *,
@@ -783,48 +658,6 @@ def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], m
         raise ValueError(f"expected as many truths as values and masks, got {len(truths)} and {len(values)}")
     parts = [_compared(t, v, None if masks is None else masks[i]) for i, (t, v) in enumerate(zip(truths, values))]
     return call(lib.vsh_compare_accuracy, structs_of("vsh_compared", parts), len(parts), OUT, run=run)
-
-
-class Limits:
-    """Limits of a channel: `value` is a dict by measures' names; members of `options` as of compare().
-
-    Parameters
-    ----------
-    noise : float
-        standard error that the differences may have by sampling, in units of the range
-    **values
-        limits: rmse=0.01, shift=0.2, …
-    """
-
-    def __init__(self, *, noise: float = 0.0, **values: float) -> None:
-        self.struct = ffi.new("vsh_limits *")
-        self.struct[0] = lib.vsh_limits_default()
-        if noise:
-            lib.vsh_limits_allow_noise(self.struct, noise)
-        for name, value in values.items():
-            self.struct.value[constant("VSH_MEASURE_", name, "measure")] = value
-
-    @property
-    def value(self) -> Dict[str, float]:
-        return dict(zip(MEASURES, self.struct.value))
-
-
-def compare_judge(measures: Measures, limits: Optional[Limits] = None) -> List[str]:
-    """Names of the measures that do not hold; none: they are alike."""
-    return _failed(ask(lib.vsh_compare_judge, measures._struct, (limits or Limits()).struct))
-
-
-class Tolerances(Handle, kind="vsh_tolerances"):
-    """Limits from a JSON file (docs/pipeline.md)."""
-
-    def __init__(self, path: Path) -> None:
-        super().__init__(call(lib.vsh_tolerances_read, path_of(path, "path"), OUT))
-
-    def limits(self, channel: str) -> Tuple[Limits, float]:
-        """The limits of a channel, and the share of covered texels that may differ (NaN: the file does not say)."""
-        limits, coverage = Limits(), ffi.new("double *", float("nan"))
-        ask(lib.vsh_tolerances_apply, self, channel, limits.struct, coverage)
-        return limits, coverage[0]
 
 
 class Comparison:
@@ -844,7 +677,7 @@ class Comparison:
         self.problems: List[str] = []
         while lib.vsh_comparison_channel(cdata, len(self.channels)) != ffi.NULL:
             struct = lib.vsh_comparison_channel(cdata, len(self.channels))[0]
-            channel = told(struct)
+            channel = record_of(struct)
             channel.measures, channel.failed = _measures(struct.measures), _failed(struct.failed)
             self.channels.append(channel)
         while True:

@@ -1,23 +1,24 @@
 """Shadow and ambient occlusion at points; images; lightmaps, volumes and pictures."""
 from __future__ import annotations
 
+import math
 from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._arrays import array, borrowed, output, pointer, vector
-from ._calls import OUT, ask, call, Handle, Run, run_of, Several
-from ._casters import Attributes, attributes_of, dense, Field, Grid, Light, lights_of, Meshes, meshes_of, Occluders
-from ._library import fail, ffi, lib, Path, text, Unpack
-from ._structs import constant, Filled, keep, pairs_of, path_of, split, Struct, struct_of, structs_of, texts_of, told, word, words_of_bits
+from ._core import (array, ask, borrowed, call, constant, fail, ffi, Filled, Handle, keep, lib, OUT, output, pairs_of, Path,
+                    path_of, pointer, record_of, Run, run_of, Several, split, Struct, struct_of, structs_of, text, texts_of,
+                    Unpack, vector, words_of_bits)
+from ._casters import (attribute_structs, Attributes, attributes_of, dense, Field, Grid, Light, lights_of, Meshes, meshes_of, names_of,
+                       Occluders)
 
 # --- points
 
 
 class Stats(Struct):
-    """Work that was done, added up over the calls that it was given to (vdbshade.types.ShadeStats)."""
+    """Sums up the work of the calls that get it (vdbshade.types.ShadeStats)."""
 
     KIND = "vsh_shade_stats"
 
@@ -26,7 +27,7 @@ class Stats(Struct):
 
     @property
     def told(self) -> types.ShadeStats:
-        return told(self.struct)
+        return record_of(self.struct)
 
 
 def _points(positions: ArrayLike, normals: Optional[ArrayLike], texels: Optional[ArrayLike] = None) -> Tuple[Any, int]:
@@ -79,7 +80,7 @@ def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, 
              **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
     """Cosine-weighted fraction of the hemisphere that is free within ``ao_distance`` (world units), 0 … 1 open.
 
-    Arguments as of shade_shadow(); `bent`, an array of float32 of shape (n, 3), takes bent normals: unit, world space.
+    Arguments as of shade_shadow(); `bent`, an array of float32 of shape (n, 3), receives bent normals: unit, world space.
     """
     points, count = _points(positions, numpy.asarray(normals), texels)
     values = output(out, numpy.float32, (count,), "out")
@@ -89,18 +90,8 @@ def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, 
 
 
 def tint_of(tint: "str | dict | types.Tint") -> Filled:
-    """``vsh_tint`` of "quadratic" or dict(type="power", power=(r, g, b)), checked."""
-    filled = Filled("vsh_tint", dict(type=tint) if isinstance(tint, str) else tint)
-    call(lib.vsh_tint_check, filled)
-    return filled
-
-
-def shade_tint(visibility: ArrayLike, tint: "str | types.Tint", out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
-    """Tinted visibility, linear RGB: float32 (n,) to float32 (n, 3)."""
-    values = array(visibility, numpy.float32, (None,), "visibility")
-    rgb = output(out, numpy.float32, (len(values), 3), "out")
-    ask(lib.vsh_shade_tint, len(values), values, tint_of(tint), rgb)
-    return rgb
+    """``vsh_tint`` of "quadratic" or dict(type="power", power=(r, g, b))."""
+    return Filled("vsh_tint", dict(type=tint) if isinstance(tint, str) else tint)
 
 
 def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, visibility: ArrayLike,
@@ -119,31 +110,32 @@ _SMALL = 64  # points that vsh_query_points() shades on the calling thread, with
 _FLOAT32: numpy.dtype = numpy.dtype(numpy.float32)
 _FLOAT64: numpy.dtype = numpy.dtype(numpy.float64)
 _UINT32: numpy.dtype = numpy.dtype(numpy.uint32)
+_KINDS = {_FLOAT32: "float", _FLOAT64: "double", _UINT32: "uint32_t"}
 
 
-def _rows(given: Any, kind: numpy.dtype, columns: int, name: str) -> Tuple[numpy.ndarray, int]:
-    """Rows of a query as they are in memory, and how far apart; a copy where they cannot be read so."""
+def _rows(given: Any, kind: numpy.dtype, columns: int, count: Optional[int], name: str) -> Tuple[Any, int, Any]:
+    """Rows of a query: their pointer, the bytes between them (0: none), and their array, which is a copy if C cannot read them."""
+    if given is None:
+        return ffi.NULL, 0, None
     found = given if isinstance(given, numpy.ndarray) else numpy.asarray(given)
     shape = (None, columns) if columns > 1 else (None,)
-    size = kind.itemsize
-    if found.dtype == kind and found.ndim == len(shape) and (columns == 1 or found.shape[1] == columns):
-        if found.flags.c_contiguous and found.flags.aligned:
-            return found, 0
+    size, stride = kind.itemsize, 0
+    fits = found.dtype == kind and found.ndim == len(shape) and (columns == 1 or found.shape[1] == columns) and found.flags.aligned
+    if fits and not found.flags.c_contiguous:
         stride = found.strides[0]
         inner = columns == 1 or found.strides[1] == size
-        if len(found) > 1 and inner and stride >= columns * size and stride % size == 0 and found.flags.aligned:
-            return found, stride
-    return array(found, kind, shape, name), 0
-
-
-def _at(values: numpy.ndarray, kind: str, stride: int) -> Any:
-    if stride == 0:
-        return ffi.from_buffer(kind, values)
-    return ffi.cast(kind.replace("[]", " *"), values.__array_interface__["data"][0])
+        fits = len(found) > 1 and inner and stride >= columns * size and stride % size == 0
+    if not fits:
+        found, stride = array(found, kind, shape, name), 0
+    if count is not None and len(found) != count:
+        raise ValueError(f"{name}: expected an array of shape {(count, columns) if columns > 1 else (count,)}, got {found.shape}")
+    if stride:
+        return ffi.cast(_KINDS[kind] + " *", found.__array_interface__["data"][0]), stride, found
+    return ffi.from_buffer(_KINDS[kind] + "[]", found), 0, found
 
 
 class Query(Handle, kind="vsh_query"):
-    """Occluders, lights and options, checked and made ready once: for points, asked for again and again.
+    """Occluders, lights and options, checked and prepared once for many calls.
 
     Parameters
     ----------
@@ -159,7 +151,7 @@ class Query(Handle, kind="vsh_query"):
         owner = struct_of(occluders, ffi.typeof("vsh_occluders"))
         super().__init__(call(lib.vsh_query_create, owner, structs, count, Filled("vsh_shade_options", options), OUT, keeps=owner))
         self.light_count = count
-        self.names: List[str] = [ffi.string(structs[i].name).decode() for i in range(count)]
+        self.names: List[str] = names_of(structs, count)
 
     def points(self, positions: ArrayLike, normals: Optional[ArrayLike] = None, *, shadow: bool = True, ao: bool = False,
                deviation: bool = False, distance: bool = False, gradient: bool = False, texels: Optional[ArrayLike] = None,
@@ -174,10 +166,10 @@ class Query(Handle, kind="vsh_query"):
         normals : array of float32, shape (n, 3), optional
             likewise; needed for AO
         shadow, ao, deviation, distance, gradient : bool
-            what is asked for
+            wanted values
         texels : array of uint32, shape (n,), optional
         out : dict of arrays, optional
-            as is returned: written into, and in place of the five above
+            arrays to write into, as in the result; replaces the five above
 
         Returns
         -------
@@ -189,50 +181,25 @@ class Query(Handle, kind="vsh_query"):
         -----
         Up to 64 points are shaded on the calling thread.
         """
-        at = positions if isinstance(positions, numpy.ndarray) else numpy.asarray(positions)
-        single = at.dtype == _FLOAT32
-        at, position_stride = _rows(at, _FLOAT32 if single else _FLOAT64, 3, "positions")
+        single = (positions if isinstance(positions, numpy.ndarray) else numpy.asarray(positions)).dtype == _FLOAT32
+        first, stride, at = _rows(positions, _FLOAT32 if single else _FLOAT64, 3, None, "positions")
         count = len(at)
+        up, up_stride, up_array = _rows(normals, _FLOAT32, 3, count, "normals")
+        numbers, number_stride, number_array = _rows(texels, _UINT32, 1, count, "texels")
+        points = ffi.new("vsh_points *", [count, ffi.NULL if single else first, up, numbers])
         layout = ffi.NULL
-        points = ffi.new("vsh_points *")
-        points.count = count
-        first = _at(at, "float[]" if single else "double[]", position_stride)
-        normal_stride = texel_stride = 0
-        if normals is not None:
-            up, normal_stride = _rows(normals, _FLOAT32, 3, "normals")
-            if len(up) != count:
-                raise ValueError(f"normals: expected an array of shape ({count}, 3), got {up.shape}")
-            up_first = _at(up, "float[]", normal_stride)
-            points.normals = up_first
-        if texels is not None:
-            numbers, texel_stride = _rows(texels, _UINT32, 1, "texels")
-            if len(numbers) != count:
-                raise ValueError(f"texels: expected an array of shape ({count},), got {numbers.shape}")
-            texel_first = _at(numbers, "uint32_t[]", texel_stride)
-            points.texels = texel_first
-        if single or position_stride or normal_stride or texel_stride:
-            layout = ffi.new("vsh_point_layout *", [ffi.sizeof("vsh_point_layout"), first if single else ffi.NULL, position_stride,
-                                                     normal_stride, texel_stride])
-        if not single:
-            points.positions = first
-
+        if single or stride or up_stride or number_stride:
+            layout = ffi.new("vsh_point_layout *", [ffi.sizeof("vsh_point_layout"), first if single else ffi.NULL, stride, up_stride,
+                                                     number_stride])
         lights = self.light_count
+        shapes = dict(shadow=(lights, count), shadow_deviation=(lights, count), ao=(count,), ao_deviation=(count,), distance=(count,),
+                      gradient=(count, 3))
         if out is None:
-            out = {}
-            if shadow and lights:
-                out["shadow"] = numpy.empty((lights, count), _FLOAT32)
-                if deviation:
-                    out["shadow_deviation"] = numpy.empty((lights, count), _FLOAT32)
-            if ao:
-                out["ao"] = numpy.empty(count, _FLOAT32)
-                if deviation:
-                    out["ao_deviation"] = numpy.empty(count, _FLOAT32)
-            if distance:
-                out["distance"] = numpy.empty(count, _FLOAT32)
-            if gradient:
-                out["gradient"] = numpy.empty((count, 3), _FLOAT32)
+            asked = dict(shadow=shadow and lights, shadow_deviation=shadow and lights and deviation, ao=ao, ao_deviation=ao and deviation,
+                         distance=distance, gradient=gradient)
+            out = {name: numpy.empty(shapes[name], _FLOAT32) for name, wanted in asked.items() if wanted}
         else:
-            self._check(out, count)
+            self._check(out, shapes)
         values, keeps = self._output(out, count)
         if count <= _SMALL:
             error = ffi.new("vsh_error *")
@@ -242,13 +209,10 @@ class Query(Handle, kind="vsh_query"):
                 fail(result, error)
         else:
             call(lib.vsh_query_points, self, points, layout, values, stats, run=run)
-        del keeps
+        del keeps, up_array, number_array
         return out
 
-    def _check(self, out: Dict[str, numpy.ndarray], count: int) -> None:
-        lights = self.light_count
-        shapes = dict(shadow=(lights, count), shadow_deviation=(lights, count), ao=(count,), ao_deviation=(count,),
-                      distance=(count,), gradient=(count, 3))
+    def _check(self, out: Dict[str, numpy.ndarray], shapes: Mapping[str, Tuple[int, ...]]) -> None:
         for name, values in out.items():
             if name not in shapes:
                 raise ValueError(f"out: no value {name!r}; there are {', '.join(shapes)}")
@@ -260,19 +224,15 @@ class Query(Handle, kind="vsh_query"):
         values = ffi.new("vsh_query_output *")
         values.struct_size = _OUTPUT_SIZE
         keeps = []
-        for name, array_of in out.items():
-            if not count:
-                continue
+        for name, array_of in out.items() if count else ():
             first = ffi.from_buffer("float[]", array_of, require_writable=True)
             keeps.append(first)
-            if name in ("shadow", "shadow_deviation"):
-                if self.light_count == 0:
-                    continue
+            if name not in ("shadow", "shadow_deviation"):
+                setattr(values, name, first)
+            elif self.light_count:
                 planes = ffi.new("float *[]", [first + i * count for i in range(self.light_count)])
                 keeps.append(planes)
                 setattr(values, "visibility" if name == "shadow" else "deviation", planes)
-            else:
-                setattr(values, name, first)
         return values, keeps
 
 
@@ -289,16 +249,6 @@ def ao_method_traits(method: str) -> List[str]:
     return words_of_bits("VSH_METHOD_", lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
 
 
-def shadow_method_resolve(method: str, has_triangles: bool) -> str:
-    """The method that "auto" chooses with or without triangles. Returns any other method unchanged."""
-    return word("VSH_SHADOW_", lib.vsh_shadow_method_resolve(constant("VSH_SHADOW_", method, "method"), has_triangles))
-
-
-def ao_method_resolve(method: str, has_triangles: bool) -> str:
-    """Likewise of AO."""
-    return word("VSH_AO_", lib.vsh_ao_method_resolve(constant("VSH_AO_", method, "method"), has_triangles))
-
-
 # --- image files: planes of floats with names
 
 
@@ -307,7 +257,7 @@ _HOLDS = {"irradiance": "light", "tint": "light", "bent": "vector"}
 
 
 def _flat(channels: Mapping[str, ArrayLike]) -> "Tuple[Dict[str, numpy.ndarray], Dict[str, str]]":
-    """Channels of one plane each, and what they hold: of a plane (height, width, 3) its axes, as files name them."""
+    """Splits planes (height, width, 3) into channels, named as in files; and what channels hold."""
     planes, holds = {}, {}
     for name, values in channels.items():
         found = numpy.asarray(values)
@@ -383,7 +333,7 @@ def image_write(path: Path, channels: Mapping[str, ArrayLike], *, holds: Optiona
         arrays of float32 by their names: shape (height, width), row 0 on top; of (height, width, 3) each axis is a
         channel, "irradiance.R"
     holds : mapping, optional
-        what channels hold: "data", "light", "vector"
+        kinds of channels: "data", "light", "vector"
     attributes : mapping, optional
         lines of text
     **options
@@ -393,77 +343,9 @@ def image_write(path: Path, channels: Mapping[str, ArrayLike], *, holds: Optiona
 
 
 def image_check(path: Path, names: Sequence[str], shape: Tuple[int, int], *,
-                attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> int:
-    """Whether such an image could be written, without writing; bytes that writing would take at most."""
-    given = (path_of(path, "path"), _named(names, shape), _options(options, attributes))
-    call(lib.vsh_image_check, *given)
-    return ask(lib.vsh_image_writer_bytes, *given)
-
-
-def image_default_pack(names: Sequence[str]) -> str:
-    """The packing that is used where none is given: "R=irradiance.R,…"."""
-    packed = ffi.new("char[]", 1024)
-    ask(lib.vsh_image_default_pack, _named(names, (1, 1)), packed, 1024)
-    return ffi.string(packed).decode()
-
-
-class ImageWriter(Handle, kind="vsh_image_writer"):
-    """An image that is written as its rows come. In a ``with``, which puts the file in place at its end, or leaves the old
-    one where something is raised.
-
-    Parameters
-    ----------
-    names : sequence of str
-        its channels
-    shape : two ints
-        height and width
-    """
-
-    def __init__(self, path: Path, names: Sequence[str], shape: Tuple[int, int], *,
-                 holds: Optional[Mapping[str, str]] = None, attributes: Optional[Attributes] = None,
-                 **options: "Unpack[types.ImageOptions]") -> None:
-        super().__init__(call(lib.vsh_image_writer_create, path_of(path, "path"), _named(names, shape, holds),
-                              _options(options, attributes), OUT))
-        self._names, self._width = list(names), shape[1]
-
-    def add(self, channels: Mapping[str, ArrayLike]) -> None:
-        """The next rows from the top: arrays of float32 of shape (rows, width)."""
-        if set(channels) != set(self._names):
-            raise ValueError(f"channels: expected {', '.join(self._names)}; got {', '.join(channels)}")
-        arrays = [array(channels[n], numpy.float32, (None, self._width), f"channel {n!r}") for n in self._names]
-        rows = len(arrays[0]) if arrays else 0
-        if any(len(a) != rows for a in arrays):
-            raise ValueError("channels: expected as many rows of each")
-        call(lib.vsh_image_writer_add, self, rows, ffi.new("float *[]", [pointer(a) for a in arrays]))
-
-    @property
-    def clipping(self) -> types.ImageClipping:
-        """Light that integers cut, of the rows so far."""
-        return call(lib.vsh_image_writer_get_clipping, self, OUT)
-
-    def finish(self) -> None:
-        """Puts the file in place."""
-        writer = self.handle
-        self.close()
-        ffi.gc(writer, None)  # it is freed by this, also where it fails
-        call(lib.vsh_image_writer_finish, writer)
-
-    def abandon(self) -> None:
-        """Leaves the old file as it was."""
-        if not self.closed:
-            ffi.release(self.handle)
-            self.close()
-
-    def __exit__(self, kind: Any, *raised: Any) -> None:
-        if kind is not None:
-            self.abandon()
-        elif not self.closed:
-            self.finish()
-
-
-def srgb_to_linear(encoded: float) -> float:
-    """Takes the sRGB curve off a value of 0 … 1."""
-    return lib.vsh_srgb_to_linear(encoded)
+                attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> None:
+    """Checks whether such an image could be written."""
+    call(lib.vsh_image_check, path_of(path, "path"), _named(names, shape), _options(options, attributes))
 
 
 # --- lightmaps and volumes
@@ -476,26 +358,6 @@ def _lightmap_options(options: Dict[str, Any]) -> Filled:
 
 def _handle(charts: Any) -> Any:
     return struct_of(charts, ffi.typeof("vsh_charts"))
-
-
-def charts_closeness(meshes: Meshes, width: int, height: int, *, run: Optional[Run] = None) -> types.Closeness:
-    """How close to each other the charts of a lightmap of this size (texels) lie."""
-    return call(lib.vsh_charts_closeness, *meshes_of(meshes), width, height, OUT, run=run)
-
-
-class Texels(Handle, kind="vsh_texels"):
-    """Where each texel of a lightmap lies in the world, by Charts.texels()."""
-
-    @property
-    def samples(self) -> Dict[str, numpy.ndarray]:
-        """The samples, tile by tile, as views: "positions" float64 (n, 3), "normals" and "geometric_normals" float32 (n, 3),
-        "texels" uint32 (n,)."""
-        found = lib.vsh_texels_samples(self.handle)
-        n, owner = found.count, self.handle
-        return dict(positions=borrowed(found.positions, (n, 3), numpy.float64, owner),
-                    normals=borrowed(found.normals, (n, 3), numpy.float32, owner),
-                    geometric_normals=borrowed(found.geometric_normals, (n, 3), numpy.float32, owner),
-                    texels=borrowed(found.texels, (n,), numpy.uint32, owner))
 
 
 class Charts(Handle, kind="vsh_charts"):
@@ -512,7 +374,7 @@ class Charts(Handle, kind="vsh_charts"):
     padding : int or "auto"
         texels that charts are grown by
     **options
-        vdbshade.types.LightmapOptions and ShadeOptions: what a bake is made by that is given no other
+        vdbshade.types.LightmapOptions and ShadeOptions, the defaults of bakes
     """
 
     info: types.ChartsInfo
@@ -521,17 +383,13 @@ class Charts(Handle, kind="vsh_charts"):
         structs, count = meshes_of(meshes)
         reports, charts = call(lib.vsh_charts_create, structs, count, _lightmap_options(options), Several(count), OUT, run=run, keeps=structs)
         self._begin(charts, count)
-        #: what is wrong with the UVs, mesh by mesh
+        #: problems of the UVs of each mesh
         self.uv_reports: List[types.UvReport] = reports
 
     def _begin(self, cdata: Any, mesh_count: int) -> None:
         Handle.__init__(self, cdata)
         self.shape: Tuple[int, int] = (self.info.height, self.info.width)
         self.mesh_count = mesh_count
-
-    def texels(self, *, run: Optional[Run] = None) -> Texels:
-        """Where each texel lies in the world."""
-        return Texels(call(lib.vsh_texels_create, self, OUT, run=run))
 
 
 class Planes(Dict[str, numpy.ndarray]):
@@ -553,7 +411,7 @@ class Lightmap(Planes):
     errors : dict
         root mean square error that is estimated of "shadow.NAME", "ao" and "sky"; NaN where a method knows none
     field_errors : dict
-        what of it rays don't account for: the voxels'
+        the part of it by voxels
     """
 
     stats: types.BakeStats
@@ -595,8 +453,15 @@ class _Planes(Struct):
         self.struct = Filled("vsh_lightmap", given).struct
 
 
-def _names(structs: Any, count: int) -> List[str]:
-    return [ffi.string(structs[i].name).decode() for i in range(count)]
+def _error_of(error: Any) -> Tuple[float, float]:
+    """vsh_bake_error_rmse() and vsh_bake_error_field(), which are inline."""
+    if not error.values > 0.0:
+        return math.nan, math.nan
+    rays = error.square_error / error.values
+    if not error.held > 0.0:
+        return math.sqrt(rays), math.nan
+    held = error.held_square_error / error.held
+    return math.sqrt(max(rays, held)), math.sqrt(max(held - rays, 0.0))
 
 
 def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Sequence[Light]] = (), *, ao: bool = False,
@@ -617,7 +482,7 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
     bent : str, optional
         bent normals in "world" or "tangent" space (charts of ``tangents=True``)
     sky : str, optional
-        the sky that is seen, of one that is up: "y", "-z"
+        the visible sky, above this axis: "y", "-z"
     error : bool
         the standard error left in each shadow and AO value
     invalid : bool
@@ -634,7 +499,7 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
     Lightmap
     """
     structs, count = lights_of(lights)
-    names = _names(structs, count)
+    names = names_of(structs, count)
     target = _handle(charts)
     planes = _Planes(charts.shape, names, out, ao=ao, irradiance=irradiance, bent=bent, sky=sky, error=error, invalid=invalid,
                      tint=tint, ambient=ambient)
@@ -644,12 +509,13 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
     call(lib.vsh_bake_lightmap, occluders, target, structs, count, Filled("vsh_shade_options", options) if options else None, planes, stats,
          run=run)
     lightmap = Lightmap(planes.arrays)
-    lightmap.stats = told(stats.struct)
+    lightmap.stats = record_of(stats.struct)
     lightmap.stats.errors = None
     lightmap.stats.invalid_by_mesh = list(by_mesh)[: charts.mesh_count]
     kinds = [f"shadow.{n}" for n in names] + ["ao"] + (["sky"] if sky else [])
-    lightmap.errors = {n: lib.vsh_bake_error_rmse(errors + i) for i, n in enumerate(kinds) if n in lightmap}
-    lightmap.field_errors = {n: lib.vsh_bake_error_field(errors + i) for i, n in enumerate(kinds) if n in lightmap}
+    found = {n: _error_of(errors[i]) for i, n in enumerate(kinds) if n in lightmap}
+    lightmap.errors = {n: both[0] for n, both in found.items()}
+    lightmap.field_errors = {n: both[1] for n, both in found.items()}
     return lightmap
 
 
@@ -669,16 +535,9 @@ def _given(shape: Tuple[int, int], names: List[str], lightmap: Mapping[str, nump
                    sky="y" if "sky" in given else None, tint="quadratic" if tinted else None)
 
 
-def lightmap_stitch(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, run: Optional[Run] = None,
-                    **options: "Unpack[types.StitchOptions]") -> types.StitchReport:
-    """Makes the values on both sides of charts' borders agree, in a whole lightmap that was baked of these charts. Its arrays
-    are written into."""
-    return lightmaps_stitch([(charts, lightmap)], run=run, **options)
-
-
 def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]], *, run: Optional[Run] = None,
                      **options: "Unpack[types.StitchOptions]") -> types.StitchReport:
-    """As lightmap_stitch() of several lightmaps of any sizes, such as pages of one atlas: borders between them, too.
+    """Makes the values on both sides of charts' borders agree, within and between lightmaps of any sizes, such as pages of one atlas.
 
     Parameters
     ----------
@@ -718,7 +577,7 @@ def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], 
 
 
 class Voxels(Handle, kind="vsh_voxels"):
-    """Voxels that are to be shaded, and where they lie. Made by its ``from_…`` methods."""
+    """Voxels to shade, and their places. Made by its ``from_…`` methods."""
 
     info: types.VoxelsInfo
 
@@ -740,10 +599,6 @@ class Voxels(Handle, kind="vsh_voxels"):
         """The active voxels of a grid of numbers in a .vdb file; `name` None: the first such grid."""
         return cls._of(call(lib.vsh_voxels_from_vdb, path_of(path, "path"), name, OUT, run=run))
 
-    def centre(self, x: int, y: int, z: int) -> Tuple[float, ...]:
-        """World position of a voxel's centre."""
-        return ask(lib.vsh_voxels_centre, self, ffi.new("int32_t[3]", [x, y, z]), Several(3))
-
 
 class Volume(Handle, kind="vsh_volume"):
     """Grids of a bake: "shadow.NAME", "ao", "error.NAME", "error.ao"."""
@@ -763,13 +618,6 @@ class Volume(Handle, kind="vsh_volume"):
             raise KeyError(f"no grid {grid!r}; there are {', '.join(names)}")
         return names.index(grid)
 
-    def sample(self, grid: Union[int, str], positions: ArrayLike, out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
-        """Values at positions (n, 3), world units, interpolated: an array of float32 of shape (n,)."""
-        at = array(positions, numpy.float64, (None, 3), "positions")
-        values = output(out, numpy.float32, (len(at),), "out")
-        call(lib.vsh_volume_sample, self, self._number(grid), len(at), at, values)
-        return values
-
     def values(self, grid: Union[int, str], index_min: Sequence[int], shape: Sequence[int],
                out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
         """A dense copy: float32 of shape (depth, height, width) from voxel `index_min` (x, y, z) on; 1 where not active."""
@@ -778,8 +626,7 @@ class Volume(Handle, kind="vsh_volume"):
 
     def write(self, path: Path, *, half: bool = False, attributes: Optional[Attributes] = None) -> None:
         """Writes all grids as one .vdb file, whole or not at all."""
-        lines = attributes_of(attributes)
-        call(lib.vsh_volume_write, self, path_of(path, "path"), half, structs_of("vsh_attribute", lines), len(lines))
+        call(lib.vsh_volume_write, self, path_of(path, "path"), half, *attribute_structs(attributes))
 
 
 def bake_volume(occluders: Occluders, voxels: Voxels, lights: Union[Light, Sequence[Light]] = (), *, stats: Optional[Stats] = None,
@@ -836,13 +683,13 @@ class Camera(Struct, kind="vsh_camera"):
 
 
 class LitMeshes(Struct, kind="vsh_lit_meshes"):
-    """Meshes that are shown themselves.
+    """Meshes to show.
 
     Parameters
     ----------
     meshes : Mesh, Model or sequence of Mesh
     lightmap : mapping, optional
-        planes of a bake on them; None: light is asked for at each point
+        planes of a bake on them; None: each point is shaded
     color : three floats
     ambient : bool
         its irradiance has the sky's light in it

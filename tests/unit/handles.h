@@ -1,0 +1,137 @@
+/* Handles and meshes made in one call, with default options. A test fails if one cannot be made. */
+#ifndef TESTS_HANDLES_H
+#define TESTS_HANDLES_H
+
+#include "testing.h"
+
+#define COUNT_OF(array) (sizeof(array) / sizeof((array)[0]))
+
+/* Six indices of two triangles whose four corners go around. */
+static const uint32_t QUAD_ORDER[6] = {0, 1, 2, 0, 2, 3};
+
+/* `uvs` NULL: none. */
+static inline vsh_mesh mesh_of_arrays(const char *name, const float *positions, const float *uvs,
+                                      size_t vertices, const uint32_t *indices, size_t triangles) {
+    return (vsh_mesh){.name = name,
+                      .positions = positions,
+                      .uvs = uvs,
+                      .indices = indices,
+                      .vertex_count = vertices,
+                      .triangle_count = triangles};
+}
+
+static inline vsh_mesh quad_of_arrays(const char *name, const float positions[12], const float uvs[8]) {
+    return mesh_of_arrays(name, positions, uvs, 4, QUAD_ORDER, 2);
+}
+
+/* --- level sets */
+
+static inline vsh_sdf_node box_node(double half_x, double half_y, double half_z) {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    node.shape = VSH_SDF_BOX;
+    memcpy(node.size, (const double[3]){half_x, half_y, half_z}, sizeof node.size);
+    return node;
+}
+
+/* VSH_SDF_UNION or another operation on two nodes of a tree. */
+static inline vsh_sdf_node operation_node(int32_t operation, int32_t left, int32_t right) {
+    vsh_sdf_node node = vsh_sdf_node_default();
+    node.shape = operation;
+    node.left = left;
+    node.right = right;
+    return node;
+}
+
+static inline vsh_grid *grid_from_sdf(const vsh_sdf *sdf, double voxel) {
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_sdf(sdf, &options, NULL, &grid, &failure));
+    return grid;
+}
+
+static inline vsh_grid *grid_from_distance(const vsh_distance *distance, double voxel) {
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_distance(distance, &options, NULL, &grid, &failure));
+    return grid;
+}
+
+static inline vsh_grid *grid_from_meshes(const vsh_mesh *meshes, size_t count, double voxel) {
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_meshes(meshes, count, &options, NULL, &grid, &failure));
+    return grid;
+}
+
+static inline vsh_grid_info grid_info(const vsh_grid *grid) {
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    return info;
+}
+
+/* Frees the grid. Reach 0: the default one. */
+static inline vsh_field *field_of_grid(vsh_grid *grid, double reach) {
+    vshi_field_options options = vshi_field_options_default();
+    options.reach = reach;
+    vsh_field *field = NULL;
+    assert_ok(vshi_field_create(grid, &options, NULL, &field, &failure));
+    vsh_grid_free(grid);
+    return field;
+}
+
+static inline vsh_field_info field_info(const vsh_field *field) {
+    vsh_field_info info;
+    vsh_field_get_info(field, &info);
+    return info;
+}
+
+static inline float distance_at(const vsh_field *field, const double position[3]) {
+    float distance = NAN;
+    vsh_field_sample(field, 1, position, &distance);
+    return distance;
+}
+
+/* --- triangles and their texels */
+
+static inline vshi_triangles *triangles_from(const vsh_mesh *meshes, size_t count) {
+    vshi_triangles *triangles = NULL;
+    assert_ok(vshi_triangles_create(meshes, count, NULL, &triangles, &failure));
+    return triangles;
+}
+
+static inline vsh_occluders *occluders_from_triangles(const vshi_triangles *triangles) {
+    vshi_occluder_parts parts = {.field = NULL};
+    vsh_occluders *occluders = NULL;
+    parts.triangles = triangles;
+    assert_ok(vshi_occluders_from_parts(&parts, &occluders, &failure));
+    return occluders;
+}
+
+static inline vsh_charts *charts_from(const vsh_mesh *meshes, size_t count,
+                                      const vsh_lightmap_options *options) {
+    vsh_charts *charts = NULL;
+    assert_ok(vsh_charts_create(meshes, count, options, NULL, NULL, &charts, &failure));
+    return charts;
+}
+
+static inline vshi_texels *texels_from(const vsh_charts *charts) {
+    vshi_texels *texels = NULL;
+    assert_ok(vshi_texels_create(charts, NULL, &texels, &failure));
+    return texels;
+}
+
+/* --- files */
+
+static inline vsh_image_file *image_from(const char *path) {
+    vsh_image_file *file = NULL;
+    assert_ok(vsh_image_read(path, NULL, &file, &failure));
+    return file;
+}
+
+static inline vsh_model *model_from(const char *path) {
+    vsh_model *model = NULL;
+    assert_ok(vsh_model_read(path, NULL, &model, &failure));
+    return model;
+}
+
+#endif

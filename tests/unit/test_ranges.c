@@ -1,0 +1,749 @@
+/* The ends of every range that a scene has, by every method: voxels, places, bands, AO distances, steps,
+ * receivers, normals and lights. A value there is a closed form, or the one in the middle of the range, or
+ * refused by name. docs/accuracy.md has the bounds. test_light.c has lights that are refused. */
+#include "testing.h"
+#include "traced.h"
+
+#include "field/field.h"
+#include "shade/kernel/march.h"
+#include "truth/metrics.h"
+
+enum { SIDE = 64, COUNT = SIDE * SIDE };
+
+static const float UP[3] = {0.0f, 1.0f, 0.0f};
+static const double NOWHERE[3] = {0.0, 0.0, 0.0};
+static double positions[3 * COUNT];
+static float normals[3 * COUNT];
+
+typedef struct picture {
+    float v[KINDS][COUNT];
+} picture;
+
+/* Values that few rays make: they may change by a whole ray where an edge moves by a rounding. */
+static bool by_rays(int kind) {
+    return is_ao(kind) ? kind >= SHADOW_METHODS + VSH_AO_RAYS : kind >= VSH_SHADOW_RAYS;
+}
+
+/* Shadow and AO of the seeds' floor, scaled and then moved. */
+static void bake_floor(double scale, const double offset[3], picture *p) {
+    static double places[3 * COUNT];
+    for (size_t i = 0; i < 3 * COUNT; ++i) {
+        places[i] = scale * (positions[i] + offset[i % 3]);
+    }
+    FREED_BY(caster_free) casting c = caster_of_moved(truth_seeds(), 0.04, scale, offset, 8.0 * scale);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    for (int kind = 0; kind < KINDS; ++kind) {
+        const vsh_shade_stats stats =
+            cast_kind(&c, kind, &light, 0.75 * scale, COUNT, places, normals, p->v[kind]);
+        assert_int_equal(stats.invalid, 0);
+        assert_int_equal(stats.unfinished, 0);
+    }
+}
+
+/* Estimators differ by less than `rms` and `worst`, rays by `rays` rms. Values of `hard` are
+ * 0 or 1, so a texel on an edge may change by 1: one of 4096 gives an rms of 0.0156, and one ray of 64 gives
+ * 2.4e-4. */
+static void assert_alike(const picture *a, const picture *b, double rms, double worst, double rays) {
+    for (int kind = 0; kind < KINDS; ++kind) {
+        const truth_metrics m = truth_compare(COUNT, a->v[kind], b->v[kind], NULL);
+        assert_true(m.rmse < (kind == VSH_SHADOW_HARD ? 0.016 : by_rays(kind) ? rays : rms));
+        assert_true(kind == VSH_SHADOW_HARD || by_rays(kind) || m.max < worst);
+    }
+}
+
+/* Scales that are no powers of two: sums round elsewhere. */
+TEST(voxels_from_1e_12_to_1e12_give_the_same_picture) {
+    static picture middle, there;
+    floor_texels(SIDE, positions, normals);
+    bake_floor(1.0, NOWHERE, &middle);
+    const double voxels[] = {1e-12, 1e-9, 1e-6, 1.4e-5, 1.6e-5, 1e-3, 1e3, 1e6, 1e9, 1e12};
+    for (size_t v = 0; v < COUNT_OF(voxels); ++v) {
+        bake_floor(voxels[v] / 0.04 * (1.0 + 1e-9 * (v == 0) - 1e-9 * (v == 9)), NOWHERE, &there);
+        assert_alike(&there, &middle, 1e-5, 1e-3, 2e-3);
+    }
+}
+
+TEST(voxels_beyond_the_ends_are_refused_by_size) {
+    const double voxels[] = {0.9e-12, 1e-30, 1.1e12, 1e30};
+    for (size_t v = 0; v < COUNT_OF(voxels); ++v) {
+        vsh_sdf_node node = vsh_sdf_node_default();
+        node.scale = 20.0 * voxels[v];
+        const vsh_sdf sdf = {&node, 1};
+        const vsh_grid_options options = with_voxel(voxels[v]);
+        vsh_grid *grid = NULL;
+        assert_fails(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_LIMIT, "1e-12");
+        assert_null(grid);
+    }
+}
+
+TEST(far_from_the_origin_the_picture_stays) {
+    static picture middle, there;
+    floor_texels(SIDE, positions, normals);
+    bake_floor(1.0, NOWHERE, &middle);
+    const double offsets[][3] = {{1e4, 0.0, 0.0}, {1e7, -1e7, 1e7}, {-1e9, 1e9, 1e9}, {3e10, 0.0, -1e10}};
+    for (size_t o = 0; o < 4; ++o) {
+        /* of the lattice too, which else lies elsewhere in the scene */
+        double whole[3];
+        for (int axis = 0; axis < 3; ++axis) {
+            whole[axis] = 0.04 * round(offsets[o][axis] / 0.04);
+        }
+        bake_floor(1.0, whole, &there);
+        assert_alike(&there, &middle, 1e-4, 2e-3, 5e-3);
+    }
+}
+
+/* A ball and a box beside it; NULL where the half width is refused. */
+static vsh_field *field_of_half_width(double half_width) {
+    vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
+    nodes[0].radius = 0.5;
+    nodes[0].translation[1] = 0.9;
+    nodes[1].shape = VSH_SDF_BOX;
+    nodes[1].size[0] = nodes[1].size[2] = 0.3;
+    nodes[1].size[1] = 0.5;
+    nodes[1].translation[0] = 1.3;
+    nodes[1].translation[1] = 0.5;
+    nodes[2].shape = VSH_SDF_UNION;
+    nodes[2].left = 0;
+    nodes[2].right = 1;
+    vsh_grid_options options = with_voxel(0.03);
+    options.half_width = half_width;
+    if (half_width < 3.0 || half_width > 100.0) {
+        const vsh_sdf sdf = {nodes, 3};
+        vsh_grid *grid = NULL;
+        assert_fails(vsh_grid_from_sdf(&sdf, &options, NULL, &grid, &failure), VSH_ERROR_ARGUMENT,
+                     "half_width");
+        return NULL;
+    }
+    return field_of_grid(grid_of_tree(nodes, 3, options), 0.0);
+}
+
+/* Bands wider than 6 voxels are cut: the field makes its levels from them. */
+TEST(half_widths_from_6_to_100_give_the_same_picture_and_3_one_as_near_the_truth) {
+    static picture at_6, there;
+    static float truth[2][COUNT], outside[COUNT];
+    const double up[3] = {0.0, 1.0, 0.0};
+    const truth_solid solids[2] = {{TRUTH_SPHERE, {0.0, 0.9, 0.0}, {0, 0, 0}, 0.5, 0.0},
+                                   {TRUTH_BOX, {1.3, 0.5, 0.0}, {0.3, 0.5, 0.3}, 0.0, 0.0}};
+    const truth_scene scene = {solids, 2};
+    floor_texels(SIDE, positions, normals);
+    assert_int_equal(truth_lights(scene, COUNT, positions, up, truth_seeds_sun, truth_seeds_w,
+                                  (double)INFINITY, 256, truth[0]),
+                     0);
+    for (size_t i = 0; i < COUNT; ++i) {
+        truth[1][i] = (float)truth_ao(scene, positions + 3 * i, up, 0.75, 256);
+        outside[i] = truth_distance(scene, positions + 3 * i) > 0.0 ? 1.0f : 0.0f;
+    }
+    casting c = {NULL, triangles_of_moved(scene, 1.0, NOWHERE)};
+    const vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
+    const double half_widths[] = {1.0, 2.0, 2.999, 6.0, 3.0, 4.0, 10.0, 30.0, 100.0, 101.0};
+    for (size_t h = 0; h < COUNT_OF(half_widths); ++h) {
+        c.field = field_of_half_width(half_widths[h]);
+        for (int kind = 0; kind < KINDS && c.field != NULL; ++kind) {
+            picture *p = half_widths[h] == 6.0 ? &at_6 : &there;
+            cast_kind(&c, kind, &light, 0.75, COUNT, positions, normals, p->v[kind]);
+            const truth_metrics m = truth_compare(COUNT, p->v[kind], truth[is_ao(kind)], outside);
+            const truth_metrics same = truth_compare(COUNT, at_6.v[kind], truth[is_ao(kind)], outside);
+            const truth_metrics apart = truth_compare(COUNT, p->v[kind], at_6.v[kind], outside);
+            /* as at 6, or a tenth of a penumbra's step worse at 3 and 4, whose coarse levels hold less */
+            assert_true(m.rmse <= same.rmse + 0.004);
+            assert_true(kind != VSH_SHADOW_CONE || m.rmse < 0.032);
+            /* distances that differ by a float's rounding, 1e-6 voxels, may be rounded to steps of 2.4e-4
+             * apart: a 250th of them, an rms of 1.5e-5 */
+            assert_true(half_widths[h] < 6.0 || apart.rmse < (kind == VSH_SHADOW_HARD ? 0.016
+                                                              : by_rays(kind)         ? 2e-3
+                                                                                      : 1.5e-5));
+        }
+        vshi_field_free(c.field);
+    }
+    vshi_triangles_free(c.triangles);
+}
+
+TEST(ao_distances_below_a_voxel_and_above_the_scene_are_exact) {
+    const truth_solid solids[2] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {2.0, 0.5, 2.0}, 0.0, 0.0},
+                                   {TRUTH_BOX, {-1.5, 1.0, 0.0}, {0.5, 1.0, 2.0}, 0.0, 0.0}};
+    const truth_scene scene = {solids, 2};
+    FREED_BY(caster_free) casting c = caster_of(scene, 0.04, 0.0);
+    const double distances[] = {0x1p-1000, 1e-300, 1e-12, 1e-3, 0.01,  0.04,
+                                4.0,       40.0,   1e6,   1e12, 1e300, 0x1p1000};
+    enum { PLACES = 24 };
+    float all[PLACES] = {0.0f}, v[PLACES], ns[3 * PLACES];
+    double at[3 * PLACES], truth[PLACES];
+    for (int i = 0; i < PLACES; ++i) {
+        const double p[3] = {-0.9 + 0.1 * i, 0.0, 0.11}, up[3] = {0.0, 1.0, 0.0};
+        const double lifted[3] = {p[0], 1e-6, p[2]};
+        memcpy(at + 3 * i, p, sizeof p);
+        memcpy(ns + 3 * i, UP, sizeof UP);
+        truth[i] = truth_ao(scene, lifted, up, 100.0, 4096);
+    }
+    for (int32_t method = 0; method < AO_METHODS; ++method) {
+        for (size_t d = 0; d < COUNT_OF(distances); ++d) {
+            cast_ao(&c, method, distances[d], PLACES, at, ns, v);
+            double worst = 0.0;
+            for (int i = 0; i < PLACES; ++i) {
+                assert_true(v[i] >= 0.0f && v[i] <= 1.0f);
+                worst = fmax(worst, fabs((double)v[i] - truth[i]));
+                if (distances[d] < 0.05) {
+                    assert_true(v[i] == 1.0f); /* the wall is farther than that */
+                }
+                if (distances[d] == 4.0) {
+                    all[i] = v[i]; /* all that there is */
+                } else if (distances[d] > 4.0 && method != VSH_AO_TAPS) {
+                    assert_int_equal(bits_of(v[i]), bits_of(all[i]));
+                }
+            }
+            /* 3 times the requested standard error; cones smooth the edges of the wall */
+            assert_true(distances[d] < 1.0 || method == VSH_AO_TAPS ||
+                        worst < (method == VSH_AO_CONES ? 0.08 : 0.06));
+        }
+    }
+}
+
+/* A bar of 30 000 voxels, and a ray so near to its face that each step is the least one, a quarter of a
+ * voxel. Samples lie at distances along the ray, so no error adds up. */
+TEST(a_hundred_thousand_least_steps_lose_nothing) {
+    const double length = 30000.0;
+    const truth_solid bar = {TRUTH_BOX, {0.0, -4.0, 0.0}, {0.5 * length, 4.0, 4.0}, 0.0, 0.0};
+    OWNED(vsh_field) *field = field_of((truth_scene){&bar, 1}, 1.0, 8.0);
+    const double heights[] = {0.01, 0.1, 0.24};
+    for (int i = 0; i < 3; ++i) {
+        /* the kernel itself: its callers allow 65536 steps */
+        const double start[3] = {-0.5 * length + 100.0, heights[i], 0.3};
+        const vshi_vec o = vshi_to_field(field, start);
+        static vshi_chunk ray;
+        ray.count = 1;
+        ray.origin[0][0] = (float)o.x;
+        ray.origin[1][0] = (float)o.y;
+        ray.origin[2][0] = (float)o.z;
+        ray.direction[0][0] = 1.0f;
+        ray.begin[0] = 0.0625f;
+        ray.end[0] = (float)(length - 200.0);
+        ray.close[0] = 1.0f;
+        vshi_march_stats stats = {0, 0};
+        vshi_kernel_of(VSH_ISA_BEST)->march(field, &ray, VSHI_MARCH_PLAIN, 1 << 20, &stats);
+        const double expected = heights[i] / (length - 200.0);
+        assert_true(stats.samples > 100000);
+        assert_int_equal(stats.unfinished, 0);
+        assert_true(fabs((double)ray.close[0] / expected - 1.0) < 1e-3);
+    }
+    /* and through the front door, out of steps: lit as far as is known, and counted */
+    const double p[3] = {-0.5 * length + 100.0, 0.1, 0.3}, along[3] = {1.0, 0.0, 0.0};
+    const vsh_light light = sun(along, 0.0);
+    vsh_shade_options options = preview_options();
+    options.method = VSH_SHADOW_HARD;
+    options.max_steps = 65536;
+    const vsh_points points = {1, p, NULL, NULL};
+    vsh_shade_stats stats = vsh_shade_stats_zero();
+    float v = -1.0f;
+    assert_ok(
+        vsh_shade_shadow(occluders_of(field), &points, &light, &options, NULL, &v, NULL, &stats, &failure));
+    assert_true(v == 1.0f);
+    assert_int_equal(stats.unfinished, 1);
+    assert_int_equal(stats.samples, 65536);
+}
+
+/* --- receivers: deep inside, far outside, on lattice planes; normals of any length, zero, not finite */
+
+TEST(receivers_deep_inside_are_dark_and_far_outside_are_lit) {
+    const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
+    FREED_BY(caster_free) casting c = caster_of((truth_scene){&block, 1}, 0.05, 0.0);
+    uint64_t counter = 12;
+    for (int i = 0; i < 400; ++i) {
+        double d[3], out[3];
+        random_direction(&counter, d);
+        random_direction(&counter, out);
+        const double depth = pow(10.0, between(&counter, -1.0, 0.0));
+        const double p[3] = {between(&counter, depth - 2.0, 2.0 - depth),
+                             between(&counter, depth - 2.0, 2.0 - depth),
+                             between(&counter, depth - 2.0, 2.0 - depth)};
+        const double away = pow(10.0, between(&counter, 1.0, 15.0));
+        const double q[3] = {away * out[0], away * out[1], away * out[2]};
+        const float n[3] = {(float)d[0], (float)d[1], (float)d[2]};
+        const vsh_light light = sun(d, i % 2 ? 0.0 : 0.05), from = sun(out, 0.05);
+        for (int kind = 0; kind < KINDS; ++kind) {
+            const float *facing = is_ao(kind) ? n : NULL;
+            const float inside = cast_kind_at(&c, kind, &light, 1.0, p, facing),
+                        outside = cast_kind_at(&c, kind, &from, 1.0, q, facing);
+            /* taps go up the normal by the AO distance, and may come out of the solid */
+            assert_that((kind == SHADOW_METHODS + VSH_AO_TAPS ? inside < 1.0f : inside == 0.0f) &&
+                            outside == 1.0f,
+                        "%s: %.9g at (%g, %g, %g) inside, %.9g outside", name_of(kind), (double)inside, p[0],
+                        p[1], p[2], (double)outside);
+        }
+    }
+}
+
+/* Distances up to 1e280, in every direction from the casters, with light towards them and away. */
+TEST(receivers_at_any_distance_are_lit) {
+    const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {2.0, 2.0, 2.0}, 0.0, 0.0};
+    const double scales[] = {1e-10, 1e-6, 1.0, 1e10};
+    uint64_t counter = 5;
+    for (int s = 0; s < 4; ++s) {
+        FREED_BY(caster_free)
+        casting c = caster_of_moved((truth_scene){&block, 1}, 0.2, scales[s], NOWHERE, 0.0);
+        for (double away = 1e6; away < 1e280; away *= away < 1e24 ? 10.0 : 1e16) {
+            double out[3], other[3];
+            random_direction(&counter, out);
+            random_direction(&counter, other);
+            const double far = away * scales[s], q[3] = {far * out[0], far * out[1], far * out[2]};
+            const double to[3] = {-out[0], -out[1], -out[2]};
+            const vsh_light lights[] = {sun(other, 0.05), sun(out, 0.0), sun(to, 0.05), sun(to, 3.0),
+                                        lamp(NOWHERE, 4.0 * scales[s])};
+            const float n[3] = {(float)to[0], (float)to[1], (float)to[2]};
+            for (int l = 0; l < 5; ++l) {
+                for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+                    const bool one_sided = l == 2 || l == 3 ? method < VSH_SHADOW_CONE : false;
+                    const float v = cast_shadow_at(&c, &lights[l], method, q, NULL);
+                    assert_that(one_sided || l == 4 ? v >= 0.0f && v <= 1.0f : v == 1.0f,
+                                "%g sizes away, light %d, %s: %.9g", away, l, name_of(method), (double)v);
+                }
+            }
+            for (int32_t method = 0; method < AO_METHODS; ++method) {
+                assert_true(cast_ao_at(&c, method, scales[s], q, n) == 1.0f);
+                const float v = cast_ao_at(&c, method, 2.0 * far, q, n);
+                assert_that(v > (method == VSH_AO_TAPS ? -1.0f : 0.9f) && v <= 1.0f,
+                            "%g sizes away, %s: %.9g", away, name_of(SHADOW_METHODS + method), (double)v);
+            }
+        }
+    }
+}
+
+/* Receivers lie exactly on planes, edges and corners of cells, bricks and levels. Their neighbours are off by
+ * less than a float can hold. A ray of 64 may come to lie on the other side of an edge. */
+TEST(receivers_on_voxel_planes_have_their_neighbours_values) {
+    enum { PLACES = 4000, SIDES = 6, ALL = PLACES * (SIDES + 1) };
+    static double at[3 * ALL];
+    static float ns[3 * ALL], values[ALL];
+    static uint32_t texels[ALL]; /* neighbours take the same rays */
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.0625, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    uint64_t counter = 8;
+    for (uint32_t i = 0; i < PLACES; ++i) {
+        double p[3];
+        for (uint32_t axis = 0; axis < 3; ++axis) {
+            const double step = 0.0625 * (double)(1 << (i % 6));
+            p[axis] = axis != 1 && i % 7 == axis ? between(&counter, -2.4, 2.4)
+                                                 : step * round(between(&counter, -2.4, 2.4) / step);
+        }
+        p[1] = fabs(p[1]) + (i % 3 == 0 ? 0.0 : 0.0625);
+        for (uint32_t side = 0; side <= SIDES; ++side) {
+            const size_t k = (SIDES + 1) * (size_t)i + side;
+            memcpy(at + 3 * k, p, sizeof p);
+            memcpy(ns + 3 * k, UP, sizeof UP);
+            texels[k] = i;
+            if (side < SIDES) {
+                at[3 * k + side / 2] += side % 2 ? 1e-9 : -1e-9;
+            }
+        }
+    }
+    const vsh_points points = {ALL, at, ns, texels};
+    for (int kind = 0; kind < KINDS; ++kind) {
+        vsh_shade_options options = preview_options();
+        options.ao_distance = 0.5;
+        shade_kind(&c, kind, &light, options, &points, values);
+        double worst = 0.0;
+        size_t changed = 0;
+        for (size_t i = 0; i < PLACES; ++i) {
+            const float v = values[(SIDES + 1) * i + SIDES];
+            assert_true(v >= 0.0f && v <= 1.0f);
+            for (size_t side = 0; side < SIDES; ++side) {
+                const double apart = fabs((double)(values[(SIDES + 1) * i + side] - v));
+                worst = fmax(worst, apart);
+                changed += apart > 1e-4;
+            }
+        }
+        const bool rays = is_ao(kind) ? kind >= SHADOW_METHODS + VSH_AO_RAYS
+                                      : kind >= VSH_SHADOW_RAYS || kind == VSH_SHADOW_HARD;
+        assert_true(rays ? changed < PLACES * SIDES / 100 : worst < 1e-4);
+    }
+}
+
+TEST(normals_of_any_length_are_directions) {
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.0625, 0.0);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    const int exponents[] = {-149, -126, -60, -1, 1, 60, 127};
+    for (int i = 0; i < 60; ++i) {
+        const double p[3] = {-2.4 + 0.08 * i, 0.0, 0.3};
+        for (size_t e = 0; e < COUNT_OF(exponents); ++e) {
+            const float n[3] = {0.0f, ldexpf(1.0f, exponents[e]), 0.0f};
+            for (int kind = 0; kind < KINDS; ++kind) {
+                assert_true(bits_of(cast_kind_at(&c, kind, &light, 0.5, p, n)) ==
+                            bits_of(cast_kind_at(&c, kind, &light, 0.5, p, UP)));
+            }
+        }
+    }
+}
+
+/* Such points are NaN and counted, in every method. The others are as without them. The last place is a
+ * double, but no place in field space. */
+TEST(invalid_points_are_nan_and_counted) {
+    enum { PLACES = 9, BAD = 7 };
+    FREED_BY(caster_free) casting c = caster_of_moved(truth_seeds(), 0.0625, 1e-9, NOWHERE, 8e-9);
+    const vsh_light light = sun(truth_seeds_sun, 0.2);
+    const float nan = (float)NAN, inf = (float)INFINITY;
+    const double at[3 * PLACES] = {
+        0.3e-9, 1e-12, 0.2e-9, (double)NAN, 0,    0, 0, (double)INFINITY,  0, 0, 0,
+        0,      0,     0,      0,           0,    0, 0, -(double)INFINITY, 0, 0, 1e305,
+        0,      0,     1e-9,   1e-12,       -1e-9};
+    const float ns[3 * PLACES] = {0, 1, 0,   0, 1, 0, 0, 1, 0, 0, 0, 0, nan, 1,
+                                  0, 0, inf, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0};
+    float all[PLACES];
+    for (int kind = 0; kind < KINDS; ++kind) {
+        const vsh_shade_stats stats = cast_kind(&c, kind, &light, 0.5e-9, PLACES, at, ns, all);
+        assert_int_equal(stats.invalid, BAD);
+        for (int i = 0; i < PLACES; ++i) {
+            assert_int_equal(isnan(all[i]) != 0, i > 0 && i <= BAD);
+        }
+        /* the samplers tell points apart by their numbers: the first keeps its own */
+        const float one = cast_kind_at(&c, kind, &light, 0.5e-9, at, ns);
+        assert_int_equal(bits_of(one), bits_of(all[0]));
+    }
+}
+
+/* --- lights: angles of suns, radii and distances of lamps; lamps in casters, on surfaces and at receivers;
+ * light that grazes */
+
+static casting plate(double voxel) {
+    const truth_solid solid = {TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0};
+    return caster_of((truth_scene){&solid, 1}, voxel, 0.0);
+}
+
+/* A ball over the receiver, out of the axis. The truth is 4096 rays. Cones take the edge as straight, so they
+ * are off by its curvature. */
+TEST(lights_of_0_to_179_degrees_stay_in_range_and_near_the_truth) {
+    const truth_solid ball = {TRUTH_SPHERE, {0.0, 2.0, 0.0}, {0.0, 0.0, 0.0}, 0.7, 0.0};
+    const truth_scene scene = {&ball, 1};
+    FREED_BY(caster_free) casting c = caster_of(scene, 0.04, 0.0), open = plate(0.06);
+    const double up[3] = {0.0, 1.0, 0.0},
+                 angles[] = {0.0, 1e-6, 1e-3, 0.5, 5, 20, 60, 90, 120, 150, 170, 179};
+    for (size_t a = 0; a < COUNT_OF(angles); ++a) {
+        const double w = tan(RADIANS(0.5 * angles[a]));
+        const vsh_light light = sun(up, RADIANS(angles[a]));
+        double worst[VSH_SHADOW_EXACT + 1] = {0.0};
+        for (int i = 0; i < 24; ++i) {
+            const double p[3] = {0.13 * i, 0.0, 0.01 * i};
+            const double truth = truth_light(scene, p, NULL, up, w, (double)INFINITY, 4096);
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+                const float v = cast_shadow_at(&c, &light, method, p, NULL);
+                assert_true(v >= 0.0f && v <= 1.0f);
+                worst[method] = fmax(worst[method], fabs((double)v - truth));
+            }
+            /* the open plate sees all of a light that is over its horizon */
+            const double q[3] = {0.1 * i - 1.2, 0.0, 0.03 * i};
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+                const float v = cast_shadow_at(&open, &light, method, q, UP);
+                assert_that(v == 1.0f, "%g degrees over an open plate, %s: %.9g", angles[a], name_of(method),
+                            (double)v);
+            }
+        }
+        /* a ball smaller than the light is no straight edge */
+        assert_true(worst[VSH_SHADOW_CONE] < (angles[a] <= 20.0 ? 0.06 : 0.6));
+        /* three standard errors of 0.02; 64 rays have less */
+        assert_true(worst[VSH_SHADOW_RAYS] < 0.05 && worst[VSH_SHADOW_ADAPTIVE] < 0.06);
+        assert_true(worst[VSH_SHADOW_EXACT] < 0.06);
+    }
+}
+
+/* A lamp over a plate, with nothing between them, and one under it; radii and distances of 1e-6 … 1e6. */
+TEST(lamps_of_1e_6_to_1e6_units_are_seen_from_above_and_not_through_the_plate) {
+    FREED_BY(caster_free) casting c = plate(0.06);
+    for (double away = 1e-6; away < 2e6; away *= 10.0) {
+        for (double radius = 1e-6; radius < 2e6; radius *= 10.0) {
+            const double p[3] = {0.31, 0.0, -0.17}, over[3] = {0.31, away, -0.17};
+            const double under[3] = {0.31, -1.0 - away - radius, -0.17};
+            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+                vsh_light light = lamp(over, radius);
+                const float lit = cast_shadow_at(&c, &light, method, p, UP);
+                light = lamp(under, radius);
+                const float turned = cast_shadow_at(&c, &light, method, p, UP);
+                const float bare = cast_shadow_at(&c, &light, method, p, NULL);
+                assert_that(lit == 1.0f && turned == 0.0f && bare >= 0.0f && bare <= 1.0f,
+                            "%g away, radius %g, %s: %.9g, %.9g, %.9g", away, radius, name_of(method),
+                            (double)lit, (double)turned, (double)bare);
+            }
+        }
+    }
+}
+
+TEST(lamps_on_a_surface_light_its_own_side) {
+    const double voxel = 0.05;
+    FREED_BY(caster_free) casting c = plate(voxel);
+    uint64_t counter = 6;
+    for (int i = 0; i < 300; ++i) {
+        const double p[3] = {between(&counter, -2.5, 2.5), i % 2 ? 0.4 : -1.4, between(&counter, -2.5, 2.5)};
+        const double x = between(&counter, -2.5, 2.5), z = between(&counter, -2.5, 2.5);
+        const double at[3] = {x, 0.0, z}, off[3] = {x, voxel, z}, in[3] = {x, -voxel, z};
+        for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+            for (int size = 0; size < 2; ++size) {
+                const vsh_light on = lamp(at, size * 0.1), above = lamp(off, 0.0), below = lamp(in, 0.0);
+                const float v = cast_shadow_at(&c, &on, method, p, NULL);
+                assert_true(v >= 0.0f && v <= 1.0f); /* to a voxel it is on either side */
+                assert_true(cast_shadow_at(&c, &above, method, p, NULL) == (i % 2 ? 1.0f : 0.0f));
+                assert_true(cast_shadow_at(&c, &below, method, p, NULL) == 0.0f);
+            }
+        }
+    }
+}
+
+/* Balls and boxes with a lamp in them, which may be larger than a voxel: rays to it meet the caster. */
+TEST(lamps_in_casters_light_nothing_outside) {
+    const truth_solid solids[2] = {{TRUTH_SPHERE, {-1.2, 0.0, 0.0}, {0, 0, 0}, 0.7, 0.0},
+                                   {TRUTH_BOX, {1.2, 0.1, 0.0}, {0.6, 0.5, 0.7}, 0.0, 0.0}};
+    const truth_scene scene = {solids, 2};
+    FREED_BY(caster_free) casting c = caster_of(scene, 0.05, 0.0);
+    uint64_t counter = 14;
+    for (int i = 0; i < 400;) {
+        const double p[3] = {between(&counter, -3.0, 3.0), between(&counter, -2.0, 2.0),
+                             between(&counter, -2.0, 2.0)};
+        if (truth_distance(scene, p) < 0.1) {
+            continue;
+        }
+        const double radii[] = {0.0, 1e-6, 0.2};
+        const double at[3] = {i % 2 ? 1.2 : -1.2, between(&counter, -0.2, 0.2), between(&counter, -0.2, 0.2)};
+        const vsh_light light = lamp(at, radii[i % 3]);
+        for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+            const float v = cast_shadow_at(&c, &light, method, p, NULL);
+            assert_that(v == 0.0f, "%s: %.9g from (%g, %g, %g)", name_of(method), (double)v, p[0], p[1],
+                        p[2]);
+        }
+        ++i;
+    }
+}
+
+/* Over a floor with nothing near, by its height and its radius: what the receiver sees of it is what its own
+ * horizon leaves, however near it is; 0 away is in it. Turned aside, to `elevation` over the floor, it must
+ * not sink under the place that rays begin at. */
+TEST(lamps_at_the_receiver_are_cut_by_its_horizon_only) {
+    const double voxel = 0.06;
+    FREED_BY(caster_free) casting c = plate(voxel);
+    const double parts[] = {0.0, 1e-6, 0.01, 0.1, 0.2, 0.25, 0.3, 0.5, 1.0, 2.0}; /* of a voxel */
+    const double elevations[] = {90.0, 60.0, 30.0};
+    for (size_t d = 0; d < COUNT_OF(parts); ++d) {
+        for (size_t e = 0; e < 3; ++e) {
+            const double p[3] = {0.31, 0.0, -0.17};
+            double way[3];
+            direction_at(RADIANS(elevations[e]), 0.3, way);
+            const double away = parts[d] * voxel;
+            const double at[3] = {p[0] + away * way[0], p[1] + away * way[1], p[2] + away * way[2]};
+            /* small enough to be over the horizon, or without size */
+            const double radii[] = {0.0, 0.4 * away, 0.1 * voxel};
+            for (int r = 0; r < 3; ++r) {
+                const vsh_light light = lamp(at, radii[r]);
+                const double sine = away > 0.0 ? radii[r] / away : 2.0;
+                const bool whole = sine >= 1.0 || sine <= way[1];
+                for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+                    const float v = cast_shadow_at(&c, &light, method, p, UP);
+                    assert_that(whole ? v == 1.0f : v >= 0.4f && v <= 1.0f,
+                                "%g voxels away at %g degrees, radius %g, %s: %.9g", parts[d], elevations[e],
+                                radii[r], name_of(method), (double)v);
+                }
+            }
+        }
+    }
+}
+
+/* With the triangles there is a truth for it: the one ray. */
+TEST(exact_of_a_light_without_size_is_one_traced_ray) {
+    static float exact[COUNT], ray[COUNT];
+    floor_texels(SIDE, positions, normals);
+    FREED_BY(caster_free) casting c = caster_of(truth_seeds(), 0.04, 0.0);
+    const double place[3] = {0.4, 2.5, 0.3};
+    const vsh_light lights[2] = {sun(truth_seeds_sun, 0.0), lamp(place, 0.0)};
+    for (int l = 0; l < 2; ++l) {
+        cast_shadows(&c, &lights[l], VSH_SHADOW_EXACT, COUNT, positions, normals, exact);
+        assert_ok(vshi_trace_shadow(c.triangles, NULL, COUNT, positions, normals, 1e-5, &lights[l], 1, NULL,
+                                    ray, &failure));
+        size_t other = 0, dark = 0;
+        for (size_t i = 0; i < COUNT; ++i) {
+            assert_true(exact[i] == 0.0f || exact[i] == 1.0f);
+            other += exact[i] != ray[i];
+            dark += ray[i] == 0.0f;
+        }
+        /* the two begin a hundred-thousandth apart, which an edge may lie in: not one in a thousand */
+        assert_true(other <= COUNT / 1000 && dark > COUNT / 20 && dark < COUNT);
+    }
+}
+
+static void turn_about(int axis, double angle, double v[3]) {
+    const int i = (axis + 1) % 3, j = (axis + 2) % 3;
+    const double a = v[i], b = v[j];
+    v[i] = cos(angle) * a - sin(angle) * b;
+    v[j] = sin(angle) * a + cos(angle) * b;
+}
+
+/* The plate of grazing_light_reaches_an_open_plate() as triangles. */
+static vshi_triangles *triangles_of_turned(const vsh_sdf_node *node, int axis, double angle) {
+    float corners[24];
+    const double low[3] = {-node->size[0], -node->size[1], -node->size[2]};
+    vsh_mesh mesh = box_mesh(corners, low, node->size);
+    double transform[12] = {0};
+    for (int column = 0; column < 3; ++column) {
+        double v[3] = {column == 0, column == 1, column == 2};
+        turn_about(axis, angle, v);
+        for (int row = 0; row < 3; ++row) {
+            transform[4 * row + column] = v[row];
+        }
+    }
+    mesh.transform = transform;
+    vshi_triangles *triangles = NULL;
+    assert_ok(vshi_triangles_create(&mesh, 1, NULL, &triangles, &failure));
+    return triangles;
+}
+
+/* Down to a millionth of a radian over the horizon: what the whole light is above of is lit, whichever way
+ * the plate lies on the lattice. */
+TEST(grazing_light_reaches_an_open_plate) {
+    for (int turn = 0; turn < 3; ++turn) {
+        const double half = RADIANS(0.5 * (turn == 0 ? 0.0 : turn == 1 ? 31.0 : 10.0));
+        vsh_sdf_node node = vsh_sdf_node_default();
+        node.shape = VSH_SDF_BOX;
+        node.size[0] = node.size[2] = 2.0;
+        node.size[1] = 0.5;
+        node.rotation[turn] = sin(half);
+        node.rotation[3] = cos(half);
+        FREED_BY(caster_free)
+        casting c = {field_of_grid(grid_of_tree(&node, 1, with_voxel(0.04)), 0.0),
+                     triangles_of_turned(&node, turn, 2.0 * half)};
+        uint64_t counter = 5;
+        for (double sine = 1e-6; sine < 0.2; sine *= 3.0) {
+            for (int i = 0; i < 60; ++i) {
+                double d[3], q[3] = {between(&counter, -1.9, 1.9), 0.5, between(&counter, -1.9, 1.9)};
+                direction_at(asin(sine), between(&counter, 0.0, 2.0 * PI), d);
+                turn_about(turn, 2.0 * half, d);
+                turn_about(turn, 2.0 * half, q);
+                double up[3] = {0.0, 1.0, 0.0};
+                turn_about(turn, 2.0 * half, up);
+                const float n[3] = {(float)up[0], (float)up[1], (float)up[2]};
+                for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
+                    const vsh_light light = sun(d, method == VSH_SHADOW_HARD ? 0.0 : sine);
+                    float v = -1.0f;
+                    const vsh_shade_stats stats = cast_shadows(&c, &light, method, 1, q, n, &v);
+                    assert_true(stats.unfinished == 0 && v == 1.0f);
+                }
+            }
+        }
+    }
+}
+
+/* A light of a type over the seeds' floor: `size` is an angle, a radius or the sides of a square. */
+static vsh_light light_of_size(int32_t type, double size) {
+    static const double ABOVE[3] = {1.0, 3.0, 1.0};
+    vsh_light light = type == VSH_LIGHT_DIRECTIONAL ? sun(truth_seeds_sun, size) : lamp(ABOVE, size);
+    light.type = type;
+    light.axis[1] = -1.0;
+    light.inner_angle = 1.0;
+    light.outer_angle = 1.2;
+    light.edge_u[0] = light.edge_v[2] = size;
+    return light;
+}
+
+/* The casters: the seeds as voxels and triangles; a ball as a layer without voxels. */
+typedef struct ranges_stage {
+    enum { FIELD, BALL, STAGES } kind;
+    casting seeds;
+    vsh_field *empty;
+    vshi_spheres *ball;
+} ranges_stage;
+
+enum { FLOOR_SIDE = 32, FLOOR = FLOOR_SIDE * FLOOR_SIDE };
+
+static float hard[FLOOR], values[FLOOR];
+
+static ranges_stage set_up(void) {
+    static const double BALL_AT[4] = {0.2, 0.8, 0.1, 0.4};
+    ranges_stage s = {.seeds = caster_of(truth_seeds(), 0.04, 0.0), .empty = field_of_nothing(0.04)};
+    assert_ok(vshi_spheres_create(BALL_AT, 1, NULL, NULL, &s.ball, &failure));
+    floor_texels(FLOOR_SIDE, positions, normals);
+    return s;
+}
+
+/* Spheres are shaded by `hard` and `classic` alone. */
+static int32_t methods_of(const ranges_stage *s) {
+    return s->kind == FIELD ? SHADOW_METHODS : VSH_SHADOW_CLASSIC + 1;
+}
+
+static void tear_down(ranges_stage *s) {
+    caster_free(&s->seeds);
+    vshi_field_free(s->empty);
+    vshi_spheres_free(s->ball);
+}
+
+static void cast_on_stage(const ranges_stage *s, const vsh_light *light, int32_t method, double softness,
+                          float *to) {
+    vshi_layer layer = vshi_layer_default();
+    layer.softness = softness;
+    layer.spheres = s->kind == BALL ? s->ball : NULL;
+    if (s->kind == FIELD) {
+        cast_shadows(&s->seeds, light, method, FLOOR, positions, normals, to);
+    } else {
+        shadows_by(occluders_with(s->empty, &layer, 1), light, method, FLOOR, positions, normals, to);
+    }
+    for (size_t i = 0; i < FLOOR; ++i) {
+        assert_that(to[i] >= 0.0f && to[i] <= 1.0f, "%s: %g", name_of(method), (double)to[i]);
+    }
+}
+
+static double mean_difference(const float *a, const float *b) {
+    double sum = 0.0;
+    for (int i = 0; i < FLOOR; ++i) {
+        sum += fabs((double)a[i] - (double)b[i]) / FLOOR;
+    }
+    return sum;
+}
+
+/* Tries every type, size, method and kind of caster. Values of large lights only have to stay in range. */
+TEST(tiny_lights_are_hard_lights) {
+    static const double SIZES[] = {5e-324, 1e-300, 1e-200, 1e-100, 1e-50, 1e-45, 1e-38, 1e-30,
+                                   1e-20,  1e-15,  1e-10,  1e-8,   1e-7,  1e-6,  1e-5,  1e-4,
+                                   1.0,    3.14,   1e3,    1e10,   1e15,  1e30,  1e99};
+    static const double SOFTNESS[] = {0.0, 5e-324, 1e-300, 1e-50, 1e-9, 1000.0}; /* of layers */
+    FREED_BY(tear_down) ranges_stage s = set_up();
+    size_t accepted = 0;
+    for (int32_t type = 0; type <= VSH_LIGHT_RECTANGLE; ++type) {
+        for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
+            for (int32_t method = 0; method < methods_of(&s); ++method) {
+                const int32_t point_type = type == VSH_LIGHT_RECTANGLE ? VSH_LIGHT_SPHERE : type;
+                const vsh_light point = light_of_size(point_type, 0.0);
+                cast_on_stage(&s, &point, method, 1.0, hard);
+                assert_true(mean_difference(hard, (const float[FLOOR]){0.0f}) < 0.99);
+                for (size_t i = 0; i < COUNT_OF(SIZES); ++i) {
+                    const vsh_light light = light_of_size(type, SIZES[i]);
+                    if (vsh_light_check(&light, NULL) != VSH_OK) {
+                        continue;
+                    }
+                    ++accepted;
+                    cast_on_stage(&s, &light, method, 1.0, values);
+                    const double off = mean_difference(values, hard);
+                    assert_that(SIZES[i] >= 1e-3 || off < 0.002, "type %d, caster %d, %s, size %g: off by %g",
+                                type, (int)s.kind, name_of(method), SIZES[i], off);
+                }
+            }
+            const vsh_light light = light_of_size(type, 0.2);
+            for (size_t i = 0; i < COUNT_OF(SOFTNESS) && s.kind == BALL; ++i) {
+                cast_on_stage(&s, &light, VSH_SHADOW_HARD, 1.0, hard);
+                cast_on_stage(&s, &light, VSH_SHADOW_CLASSIC, SOFTNESS[i], values);
+                assert_true(SOFTNESS[i] > 1.0 || mean_difference(values, hard) < 0.002);
+            }
+        }
+    }
+    assert_true(accepted > 4 * 12 * (size_t)(VSH_SHADOW_CLASSIC + 1) * STAGES);
+}
+
+/* Tries every method and kind of caster, and the last double below 180 degrees. */
+TEST(suns_just_below_180_degrees_shade_like_179_99_degrees) {
+    const double angles[] = {RADIANS(179.9999), RADIANS(179.999999), RADIANS(179.99999999),
+                             RADIANS(179.9999999999), nextafter(PI, 0.0)};
+    FREED_BY(tear_down) ranges_stage s = set_up();
+    for (s.kind = FIELD; s.kind < STAGES; ++s.kind) {
+        for (int32_t method = 0; method < methods_of(&s); ++method) {
+            vsh_light light = sun(truth_seeds_sun, RADIANS(179.99));
+            cast_on_stage(&s, &light, method, 1.0, hard);
+            for (size_t a = 0; a < COUNT_OF(angles); ++a) {
+                light.angle = angles[a];
+                cast_on_stage(&s, &light, method, 1.0, values);
+                const double off = mean_difference(values, hard);
+                assert_that(off < 0.02, "caster %d, %s, %.17g: off by %g", (int)s.kind, name_of(method),
+                            angles[a], off);
+            }
+        }
+    }
+}
