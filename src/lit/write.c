@@ -403,6 +403,13 @@ static void write_word(FILE *to, uint64_t number) {
     }
 }
 
+/* Writes bytes begin … end - 1. An empty buffer has no bytes to point to. */
+static void write_range(const unsigned char *bytes, size_t begin, size_t end, FILE *to) {
+    if (begin < end) {
+        fwrite(bytes + begin, 1, end - begin, to);
+    }
+}
+
 /* Writes all buffers, without the dropped bytes, and the added bytes. */
 static void write_buffers(const writing *w, FILE *to) {
     const vshi_lit_work *work = w->work;
@@ -417,15 +424,15 @@ static void write_buffers(const writing *w, FILE *to) {
         for (size_t i = 0; i < work->dropped.count; ++i) {
             const vshi_lit_range *range = &work->dropped.list[i];
             if (range->buffer == b && range->begin < bytes.size) {
-                fwrite(bytes.at + at, 1, range->begin - at, to);
+                write_range(bytes.at, at, range->begin, to);
                 at = range->end < bytes.size ? range->end : bytes.size;
             }
         }
-        fwrite(bytes.at + at, 1, bytes.size - at, to);
+        write_range(bytes.at, at, bytes.size, to);
         written = w->offsets[b] + bytes.size - count_dropped(work, b, bytes.size);
     }
     write_padding(to, w->added - written, '\0');
-    fwrite(work->added.list, 1, work->added.count, to);
+    write_range(work->added.list, 0, work->added.count, to);
 }
 
 /* Writes a GLB (glTF 2.0, 4.4). */
