@@ -1,4 +1,4 @@
-/* What the commands of `vdbshade` share.
+/* Declarations that the commands of `vdbshade` share.
  *
  * A function that returns an exit code prints an error before it returns another one than CLI_OK. */
 #ifndef CLI_H
@@ -258,7 +258,7 @@ typedef struct cli_command {
 #define CLI_ENDING(options, main) (options), CLI_COUNT(options), (main) /* the last members of a command */
 
 /* Parses a command line into `settings` and the variables below, and starts the progress. operands[] gets the
- * operands of the usage, NULL for a missing one in brackets. CLI_HELP if the help was asked for. */
+ * operands of the usage, NULL for a missing one in brackets. Returns CLI_HELP after it prints the help. */
 int cli_parse(const cli_command *command, int argc, char **argv, void *settings, const char **operands);
 
 /* Common options of the last command line, beside cli_run. */

@@ -156,10 +156,12 @@ static void state_grid(json_t *grids, const vsh_vdb_entry *g) {
           "  active voxels: %" PRIu64 ", %d %d %d to %d %d %d\n", g->active_voxels, low[0], low[1], low[2],
           high[0], high[1], high[2]);
     state(grid, "bytes", json_integer((json_int_t)g->bytes), "  memory: %s\n", cli_bytes_text(g->bytes));
-    json_t *attributes = add(grid, "attributes", json_array());
-    for (const char *line = g->attributes; *line != '\0';) {
-        const int length = (int)strcspn(line, "\n");
-        state(attributes, NULL, cli_utf8_json(cli_keep_text("%.*s", length, line)), "  %.*s\n", length, line);
+    json_t *attributes = add(grid, "attributes", json_object());
+    for (const char *line = g->attributes; *line != '\0';) { /* NAME: VALUE */
+        const int length = (int)strcspn(line, "\n"), name = (int)strcspn(line, ":\n");
+        const char *value = cli_keep_text("%.*s", length - name, line + name);
+        state(attributes, cli_keep_text("%.*s", name, line), cli_utf8_json(value + strspn(value, ": ")),
+              "  %.*s\n", length, line);
         line += length + (line[length] != '\0');
     }
     if (strstr(g->attributes, "vdbshade_version") != NULL && !is_level_set) {

@@ -150,7 +150,7 @@ static void print_commands(void) {
 
 /* --- man pages in the man macros, man(7), without a date: the same build gives the same page */
 
-enum { MAN_WIDTH = 56 }; /* with what escapes add, lines stay below 80 bytes */
+enum { MAN_WIDTH = 56 }; /* bytes; escapes make lines up to 80 long */
 
 /* Writes a word literally. Dashes are minus signs, which can be copied. */
 static void put_literally(FILE *out, const char *word, int length, bool first) {

@@ -192,7 +192,7 @@ int cli_fail_with(const char *path) {
     path = path != NULL ? path : cli_parsed.input;
     const bool of_values =
         code == VSH_ERROR_INPUT || code == VSH_ERROR_LIMIT || code == VSH_ERROR_UNSUPPORTED ||
-        strncmp(cli_error.message, "casters[", strlen("casters[")) == 0 || /* of a scene file */
+        strncmp(cli_error.message, "casters[", strlen("casters[")) == 0 || /* a place in a scene file */
         (code == VSH_ERROR_READ && path != NULL && cli_has_ending(path, "json"));
     return path != NULL && of_values && !names_file(cli_error.message)
                ? cli_refuse(code_of(code), "%s: %s", path, cli_error.message)

@@ -61,7 +61,7 @@ typedef struct regress_case {
     const char *output;  /* for -o; NULL: the scene names its outputs */
     lines outputs;       /* names of all files written */
     lines inputs;        /* everything that the result depends on: equal lines, equal results */
-    size_t own_inputs;   /* those before the golden bakes */
+    size_t own_inputs;   /* count of those before the golden bakes */
     const char *changed; /* the input that changed; NULL: unknown */
     int status;
     int code;                    /* exit code of a failed bake */

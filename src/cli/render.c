@@ -6,7 +6,7 @@ enum { MOST_LIGHTMAPS = 64 };
 
 typedef struct render_settings {
     cli_bake_settings bake;     /* the scene, the output and the stats */
-    vsh_render_options options; /* those that do not follow from the scene */
+    vsh_render_options options; /* settings that scenes do not have */
     int32_t size[2];
     double fov_deg, orbit_deg, exposure;
     cli_list lightmaps;
@@ -568,7 +568,7 @@ static int draw_picture(render_work *work) {
                                  .normal = work->memory + 5 * pixels};
     if (vsh_render(shown->surfaces, shown->count, shading->occluders, scene->lights, scene->light_count,
                    &s->options, &cli_run, &picture, &shading->stats.shade, &cli_error) != VSH_OK) {
-        size_t map; /* of a message "lightmap N: …" */
+        size_t map; /* N of "lightmap N: …" */
         const bool named = sscanf(cli_error.message, "lightmap %zu: ", &map) == 1 && map < s->lightmaps.count;
         return cli_fail_with(named ? s->lightmaps.text[map] : NULL);
     }

@@ -51,8 +51,8 @@ bool cli_interrupted(void) {
     return atomic_load(&interrupted);
 }
 
-/* Writes at once, under a lock of its own: the line must be out before the process ends, even if another
- * thread hangs while it writes progress. */
+/* Writes at once, under a lock of its own. The line must be out before the process ends, even if another
+ * thread hangs in a write of progress. */
 void cli_signals_tell(void) {
     static const char text[] = "\r\033[Kvdbshade: interrupted\n";
     const size_t skip = isatty(STDERR_FILENO) ? 0 : strlen("\r\033[K");

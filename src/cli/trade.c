@@ -11,8 +11,8 @@
 
 enum { MOST_RESOLUTIONS = 16, LEAST_RESOLUTION = 2, MOST_RESOLUTION = 65536 };
 
-/* What `exact` differs by from an independent baker, which traced 4096 Embree rays a texel: RMSE of shadow
- * and AO. Smaller errors are the truth's own. */
+/* RMSE of shadow and AO between `exact` and an independent baker, which traced 4096 Embree rays a texel.
+ * Smaller errors are the truth's own. */
 static const double truth_error[] = {0.0004, 0.0023};
 static const double truth_max_error = 0.0001; /* the least that the library takes */
 

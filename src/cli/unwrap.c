@@ -62,7 +62,7 @@ static int set_options(unwrap_settings *s) {
 
 /* --- the mesh file */
 
-enum { NAME_BYTES = 120 }; /* of a page's name */
+enum { NAME_BYTES = 120 }; /* longest name of a page */
 
 /* Returns the name of a mesh's object, or NULL if file names cannot hold it. */
 static const char *page_name(const vsh_mesh *mesh) {

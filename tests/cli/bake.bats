@@ -108,13 +108,10 @@ JSON
     succeed voxelize box.obj -o box.vdb --voxel-size 0.04 --quiet
     for caster in '"mesh": "box.obj"' '"vdb": "box.vdb"'; do
         name=${caster:1:3}
-        cat >"$name.json" <<JSON
-{"casters": [{$caster}], "voxel_size": 0.04, "ao": {"distance": 1},
- "receivers": [{"mesh": "box.obj", "size": 32, "output": "$name.exr"}]}
-JSON
+        write_bake "$name.json" "{$caster}" '"method": "adaptive", "voxel_size": 0.04, "ao": {"distance": 1, "method": "adaptive"}'
         succeed bake "$name.json" --quiet
     done
-    same_values mes.exr vdb.exr || fail "they differ"
+    same mes.exr vdb.exr
 }
 
 # receiver NAME KEYS: the seeds' scene, coarse, on that receiver.

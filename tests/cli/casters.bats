@@ -81,7 +81,7 @@ write_hill() {
     done
 }
 
-@test "an image of heights, a receiver alone and a caster of either name bake one terrain" {
+@test "an image of heights, a receiver alone and a caster of either name bake one terrain, whose shorter side follows from its pixels" {
     scene "{$LAND}" "$OVER" '"ao": {"distance": 1}'
     succeed bake scene.json -o one.exr
     printf '{%s, %s, "ao": {"distance": 1}}' "$SUN" "$OVER" >scene.json
@@ -94,9 +94,6 @@ write_hill() {
         succeed bake terrain.png --height 2 --size-world $world --sun=-0.7,0.4,0.3 --sun-angle 4 --ao 1 --size 96 -o out.exr
         same_values one.exr out.exr || fail "--size-world $world"
     done
-}
-
-@test "the shorter side of a terrain follows from its pixels" {
     printf 'P2 5 3 9 0 1 2 3 4 5 6 7 8 9 8 7 6 5 4\n' >long.pgm
     succeed bake long.pgm --height 2 --size-world 8 --ao 1 --size 32 -o one.exr
     succeed bake long.pgm --height 2 --size-world 8,4 --ao 1 --size 32 -o out.exr
@@ -117,54 +114,41 @@ LIST
     refuse_scene "{$LAND, \"extent\": [10, 10]}" "$OVER" 2 'casters[0].extent: cannot stand beside "size"'
 }
 
-@test "voxelize takes a terrain and spheres" {
+@test "voxelize and info read terrains and spheres" {
     scene "{$LAND}, {\"spheres\": [[0, 3, 0, 0.5]], \"voxelised\": true}" "$OVER" '"resolution": 48'
     succeed voxelize scene.json -o out.vdb --quiet
     scene '{"spheres": [[0, 3, 0, 0.5]]}' "$FLOOR" '"method": "hard"'
     succeed voxelize scene.json -o out.vdb --quiet
-}
-
-@test "info tells of terrains and spheres" {
     scene "{$LAND, \"direct\": true}, {\"spheres\": \"spheres.csv\"}, {\"spheres\": [[0, 0, 0, 1]], \"voxelised\": true}" "$OVER"
     succeed_printing "heightfield" "terrain.png" -- info scene.json
     [[ $output == *"spheres"*"spheres.csv"* ]]
     [[ $output == *"caster 2: spheres"* ]]
 }
 
-@test "a missing image or list of spheres, and an image that is none" {
+@test "what is wrong with terrains, spheres and their files is told by its place, and refused in time" {
     echo nothing >bad.png
     refuse_scene '{"heightfield": "none.png", "size": [1, 1], "height": 1}' "$OVER" 3 none.png
     refuse_scene '{"spheres": "none.csv"}' "$FLOOR" 3 none.csv
     refuse_scene '{"heightfield": "bad.png", "size": [1, 1], "height": 1, "direct": true}' "$OVER" 3 bad.png
-}
-
-@test "zero and huge sizes are refused by line and column" {
     refuse_scene '{"heightfield": "terrain.png", "size": [0, 1], "height": 1}' "$OVER" 2 'scene.json:1:' 'size[0]' 'out of range'
     refuse_scene '{"heightfield": "terrain.png", "size": [1, 2147483648e9], "height": 1}' "$OVER" 2 'size[1]' 'out of range'
-}
-
-@test "bad rows of spheres are told by their number" {
     printf 'x,y,z,r\n0,1,0,0.5\n0,1,0\n' >bad.csv
     refuse_scene '{"spheres": "bad.csv"}' "$FLOOR" 2 'bad.csv:3:' 'four numbers'
     printf '0,1,0,0.5\n0,1,0,-1\n' >bad.csv
     refuse_scene '{"spheres": "bad.csv"}' "$FLOOR" 2 'bad.csv:2:' 'radius -1'
-}
-
-@test "a memory limit holds for terrains and spheres" {
     scene "{$LAND, \"direct\": true}" "$FLOOR"
     refuses 4 terrain.png -- bake scene.json --memory-limit 200000
-}
-
-@test "an output over a caster's file is refused" {
     cp "$ASSETS/spheres.csv" own.csv
     scene '{"spheres": "own.csv"}' "$FLOOR"
     ends 2 bake scene.json -o own.csv
     cmp own.csv "$ASSETS/spheres.csv"
-}
-
-@test "trade refuses casters without voxels" {
     scene '{"spheres": "spheres.csv"}' "$FLOOR"
     refuses 2 "not part of it" -- trade scene.json -o report.html
+}
+
+# write_casters FILE.json VOXEL_SIZE CASTERS
+write_casters() {
+    printf '{"casters": [%s], "voxel_size": %s}' "$3" "$2" >"$1"
 }
 
 # same_distances A.json B.json TOLERANCE: at points all over [-2, 2]³, within 0.1 of the surface. Farther off, where the field has coarser voxels,
@@ -184,65 +168,46 @@ same_distances() {
 
 @test "a mask is the solid that its picture shows" {
     # the ring of the emblem: 36 … 44 of 96 pixels, scaled to a picture of 3.84 units; the star left out by a cylinder
-    cat >mask.json <<'JSON'
-{"casters": [{"mask": "emblem.png", "size": 3.84, "thickness": 0.5},
-             {"sdf": {"shape": "cylinder", "half_height": 0.25, "radius": 1.3, "rotate_deg": [90, 0, 0]}}],
- "voxel_size": 0.03}
-JSON
-    cat >ring.json <<'JSON'
-{"casters": [{"sdf": {"op": "union", "of": [
+    write_casters mask.json 0.03 '{"mask": "emblem.png", "size": 3.84, "thickness": 0.5},
+             {"sdf": {"shape": "cylinder", "half_height": 0.25, "radius": 1.3, "rotate_deg": [90, 0, 0]}}'
+    write_casters ring.json 0.03 '{"sdf": {"op": "union", "of": [
     {"op": "subtraction", "of": [{"shape": "cylinder", "half_height": 0.25, "radius": 1.76},
                                  {"shape": "cylinder", "half_height": 1, "radius": 1.44}]},
-    {"shape": "cylinder", "half_height": 0.25, "radius": 1.3}], "rotate_deg": [90, 0, 0]}}],
- "voxel_size": 0.03}
-JSON
+    {"shape": "cylinder", "half_height": 0.25, "radius": 1.3}], "rotate_deg": [90, 0, 0]}}'
     same_distances mask.json ring.json 0.012
 }
 
 @test "an inverted mask of another channel and a transform" {
     # the whole picture is white in its colours: below a threshold of 2 everything
-    cat >mask.json <<'JSON'
-{"casters": [{"mask": "emblem.png", "size": [2, 1], "thickness": 0.4, "channel": "luminance", "threshold": 2,
-              "invert": true, "transform": {"rotate_deg": [0, 0, 90], "scale": 1.5, "translate": [0.2, 0, 0]}}],
- "voxel_size": 0.04}
-JSON
-    cat >box.json <<'JSON'
-{"casters": [{"sdf": {"shape": "box", "half_size": [0.75, 1.5, 0.3], "translate": [0.2, 0, 0]}}], "voxel_size": 0.04}
-JSON
+    write_casters mask.json 0.04 '{"mask": "emblem.png", "size": [2, 1], "thickness": 0.4, "channel": "luminance", "threshold": 2,
+              "invert": true, "transform": {"rotate_deg": [0, 0, 90], "scale": 1.5, "translate": [0.2, 0, 0]}}'
+    write_casters box.json 0.04 '{"sdf": {"shape": "box", "half_size": [0.75, 1.5, 0.3], "translate": [0.2, 0, 0]}}'
     same_distances mask.json box.json 0.001
 }
 
 @test "text is the solid of its letters" {
     # l of DejaVu Sans is a bar from 193 to 377 of 2048 units, 1556 high
-    cat >text.json <<JSON
-{"casters": [{"text": "l", "font": "$FONT", "height": 2.048, "thickness": 0.3,
-              "transform": {"translate": [-0.285, -0.778, 0]}}], "voxel_size": 0.02}
-JSON
-    cat >bar.json <<'JSON'
-{"casters": [{"sdf": {"shape": "box", "half_size": [0.092, 0.778, 0.15]}}], "voxel_size": 0.02}
-JSON
+    write_casters text.json 0.02 '{"text": "l", "font": "'$FONT'", "height": 2.048, "thickness": 0.3,
+              "transform": {"translate": [-0.285, -0.778, 0]}}'
+    write_casters bar.json 0.02 '{"sdf": {"shape": "box", "half_size": [0.092, 0.778, 0.15]}}'
     same_distances text.json bar.json 0.001
 }
 
 @test "masks and text cast in a bake" {
-    cat >scene.json <<JSON
-{"casters": [{"text": "vdb", "font": "$FONT", "height": 1.5, "align": "center", "thickness": 0.3,
-              "transform": {"rotate_deg": [90, 0, 0], "translate": [0, 1, 0]}},
-             {"mask": "emblem.png", "size": 1, "thickness": 0.2, "transform": {"translate": [0, 0.5, -1]}}],
- "voxel_size": 0.04, "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0.2], "angle_deg": 5}],
- "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 64, "output": "one.exr"}]}
-JSON
-    succeed bake scene.json --threads 1 --quiet
-    sed -i 's/one.exr/two.exr/' scene.json
-    succeed bake scene.json --threads 7 --quiet
-    same_values one.exr two.exr
+    write_bake scene.json '{"text": "vdb", "font": "'$FONT'", "height": 1.5, "align": "center", "thickness": 0.3,
+            "transform": {"rotate_deg": [90, 0, 0], "translate": [0, 1, 0]}},
+        {"mask": "emblem.png", "size": 1, "thickness": 0.2, "transform": {"translate": [0, 0.5, -1]}}' \
+        '"voxel_size": 0.04' '"mesh": "seeds_floor.obj", "size": 64'
+    succeed bake scene.json --threads 1 --quiet -o one.exr
+    succeed bake scene.json --threads 7 --quiet -o two.exr
+    same one.exr two.exr
     succeed_printing "caster 0: text $FONT" "caster 1: mask emblem.png" -- info scene.json
     succeed_printing "channel 'shadow.sun': min 0, " "max 1" -- info one.exr
 }
 
 # refuses_caster CODE CASTER WORD …
 refuses_caster() {
-    printf '{"casters": [%s], "voxel_size": 0.05}' "$2" >bad.json
+    write_casters bad.json 0.05 "$2"
     refuses "$1" "${@:3}" -- voxelize bad.json -o out.vdb
 }
 
@@ -275,36 +240,26 @@ LIST
 }
 
 @test "exact traces the surface of a mask's voxels" {
-    cat >scene.json <<JSON
-{"casters": [{"mask": "emblem.png", "size": 1, "thickness": 0.2}], "voxel_size": 0.05, "method": "exact",
- "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}],
- "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 16, "output": "o.exr"}]}
-JSON
+    write_bake scene.json '{"mask": "emblem.png", "size": 1, "thickness": 0.2}' '"voxel_size": 0.05, "method": "exact"'
     succeed_saying "shadow exact" -- bake scene.json
 }
 
 solid() {
-    printf '{"casters": [{"sdf": %s}], "voxel_size": 0.04}' "$2" >"$1.json"
+    write_casters "$1.json" 0.04 "{\"sdf\": $2}"
     "$VDBSHADE" voxelize "$1.json" -o "$1.vdb" --name "$1" --quiet
 }
 
 @test "several .vdb files, and one of them twice, are their union" {
     solid ball '{"shape": "sphere", "radius": 0.6, "translate": [-0.9, 0, 0]}'
     solid block '{"shape": "box", "half_size": [0.4, 0.5, 0.3], "translate": [0.5, 0, 0]}'
-    cat >files.json <<'JSON'
-{"casters": [{"vdb": "ball.vdb"}, {"vdb": "block.vdb", "grid": "block"},
+    write_casters files.json 0.04 '{"vdb": "ball.vdb"}, {"vdb": "block.vdb", "grid": "block"},
              {"vdb": "ball.vdb", "grid": "ball", "transform": {"translate": [0.9, 1.2, 0.3], "scale": 0.5}},
-             {"vdb": "block.vdb", "transform": {"rotate_deg": [0, 90, 0], "translate": [0, -1.2, 0]}}],
- "voxel_size": 0.04}
-JSON
-    cat >shapes.json <<'JSON'
-{"casters": [{"sdf": {"op": "union", "of": [
+             {"vdb": "block.vdb", "transform": {"rotate_deg": [0, 90, 0], "translate": [0, -1.2, 0]}}'
+    write_casters shapes.json 0.04 '{"sdf": {"op": "union", "of": [
     {"shape": "sphere", "radius": 0.6, "translate": [-0.9, 0, 0]},
     {"shape": "box", "half_size": [0.4, 0.5, 0.3], "translate": [0.5, 0, 0]},
     {"shape": "sphere", "radius": 0.3, "translate": [0.45, 1.2, 0.3]},
-    {"shape": "box", "half_size": [0.3, 0.5, 0.4], "translate": [0, -1.2, -0.5]}]}}],
- "voxel_size": 0.04}
-JSON
+    {"shape": "box", "half_size": [0.3, 0.5, 0.4], "translate": [0, -1.2, -0.5]}]}}'
     same_distances files.json shapes.json 0.02
 }
 

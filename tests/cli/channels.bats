@@ -50,20 +50,12 @@ load helper
 LIST
 }
 
-# A wall over a floor, in one level set or in a layer, with its own voxels, or hard.
+# scene_of NAME.json LAYER KEYS: a wall over a floor, in one level set or in a layer, with its own voxels, or hard.
 scene_of() {
-    cat >"$1" <<JSON
-{
-    "casters": [
-        {"sdf": {"shape": "plane", "half_size": [3, 3], "thickness": 0.5}},
-        {"sdf": {"shape": "box", "half_size": [0.2, 1, 2], "translate": [0, 1, 0]}$2}
-    ],
-    "resolution": 96,
-    $3
-    "lights": [{"name": "sun", "type": "directional", "direction": [-1, 1.2, 0], "angle_deg": 20}],
-    "receivers": [{"mesh": "$ASSETS/seeds_floor.obj", "size": 64, "output": "${1%.json}.exr"}]
-}
-JSON
+    write_bake "$1" '{"sdf": {"shape": "plane", "half_size": [3, 3], "thickness": 0.5}},
+        {"sdf": {"shape": "box", "half_size": [0.2, 1, 2], "translate": [0, 1, 0]}'"$2}" "$3\"resolution\": 96" \
+        '"mesh": "'"$ASSETS"'/seeds_floor.obj", "size": 64'
+    sed -i 's/"direction": .*, "angle_deg": 5/"direction": [-1, 1.2, 0], "angle_deg": 20/' "$1"
 }
 
 @test "a layer casts as the casters in none do, harder or only for some lights where it says so" {

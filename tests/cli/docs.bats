@@ -18,8 +18,8 @@ scenes_of() {
 
 # run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least. Lines that a backslash ends are continued.
 run_commands() {
-    mkdir bin
-    ln -s "$(realpath "$VDBSHADE")" bin/vdbshade
+    mkdir -p bin
+    ln -sf "$(realpath "$VDBSHADE")" bin/vdbshade
     awk '/^ *```sh$/ { inside = 1; next } /^ *```$/ { inside = 0 } inside' "$DOCS/$1" |
         sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | sed 's/^ *//' | grep -E "${ONLY:-.}" >commands
     [ "$(grep -c vdbshade commands)" -ge "$2" ]
@@ -78,21 +78,12 @@ made() {
     done
 }
 
-@test "every command of docs/lit.md" {
+@test "every command of the README and of docs/lit.md, docs/pipeline.md and docs/view.md" {
     run_commands lit.md 3
     made lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr
-}
-
-@test "every command of docs/pipeline.md" {
     run_commands pipeline.md 5
-}
-
-@test "every command of docs/view.md" {
     run_commands view.md 11
     made both.html seeds.html view.png court.png baked.png shafts.exr
-}
-
-@test "every command of the README" {
     ONLY='^vdbshade' DOCS=$BATS_TEST_DIRNAME/../.. run_commands README.md 4
     made cloister.exr cloister.png seeds.exr
 }

@@ -64,10 +64,15 @@ full_at() {
     done
 }
 
-@test "a pipe that nobody reads is an error that is told" {
+@test "a pipe that nobody reads is an error that is told; a complete run replaces the old output" {
     run bash -c '"$@" -o - 2>err.txt | true; exit "${PIPESTATUS[0]}"' - "$VDBSHADE" "${QUERY[@]}"
     [ "$status" -eq 3 ] || fail "status"
     grep -q 'standard output: cannot be written: Broken pipe' err.txt || fail "$(cat err.txt)"
+    old_output out.exr
+    succeed "${BAKE[@]}" out.exr --quiet
+    [ "$(head -c 4 out.exr | od -An -tx1 | tr -d ' ')" = 762f3101 ] || fail "no EXR"
+    [ -z "$stderr" ] || fail "--quiet said something"
+    no_leftovers
 }
 
 BAKE=(bake box.obj "${SMALL[@]}" -o)
@@ -133,14 +138,6 @@ out.exr bake ${SMALL[*]} --size 256 --ao 1
 out.png bake ${SMALL[*]} --size 256 --ao 1 --bits 16
 out.vdb voxelize
 LIST
-}
-
-@test "a complete run replaces the old output" {
-    old_output out.exr
-    succeed "${BAKE[@]}" out.exr --quiet
-    [ "$(head -c 4 out.exr | od -An -tx1 | tr -d ' ')" = 762f3101 ] || fail "no EXR"
-    [ -z "$stderr" ] || fail "--quiet said something"
-    no_leftovers
 }
 
 @test "--output-folder takes all outputs of a scene by their names, and nothing else" {

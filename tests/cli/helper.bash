@@ -21,6 +21,13 @@ write_scene() {
         "$2" "${3:+, $3}" "$sun" "$2" "${4:+, $4}" >"$1"
 }
 
+# write_bake NAME.json CASTERS [KEYS [RECEIVER]]: a scene that bakes the casters' shadow under a sun onto the receiver, the cube if none
+# is given, into NAME.exr.
+write_bake() {
+    printf '{"casters": [%s], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0.2], "angle_deg": 5}],
+        "receivers": [{%s, "output": "%s.exr"}]%s}\n' "$2" "${4:-\"mesh\": \"box.obj\", \"size\": 16}" "$(basename "$1" .json)" "${3:+, $3}" >"$1"
+}
+
 # Sets rest to options without those of a sun.
 no_sun() {
     rest=()
@@ -133,6 +140,8 @@ holds() {
     awk "BEGIN { exit !($1) }" || fail "not so: $1"
 }
 
+# Prints why, and what the last run did. A function of several checks returns after each that fails: in a list such as `A || B` the
+# shell goes on.
 fail() {
     echo "$*"
     [ -z "${CASE:-}" ] || echo "case: $CASE"
@@ -151,7 +160,7 @@ no_leftovers() {
 
 # untouched FILE: it still holds what old_output() wrote.
 untouched() {
-    [ "$(cat "$1")" = old ] || fail "$1 was changed"
+    [ "$(cat "$1")" = old ] || fail "$1 was changed" || return
     no_leftovers
 }
 
@@ -159,12 +168,12 @@ untouched() {
 refused() {
     local code=$1 word
     shift
-    [ "$status" -eq "$code" ] || fail "expected exit code $code"
-    [ -z "$output" ] || fail "expected nothing on standard output"
-    [ "${#stderr_lines[@]}" -eq 1 ] || fail "expected one line on standard error"
-    [[ $stderr == "vdbshade: "* ]] || fail "expected 'vdbshade: …'"
+    [ "$status" -eq "$code" ] || fail "expected exit code $code" || return
+    [ -z "$output" ] || fail "expected nothing on standard output" || return
+    [ "${#stderr_lines[@]}" -eq 1 ] || fail "expected one line on standard error" || return
+    [[ $stderr == "vdbshade: "* ]] || fail "expected 'vdbshade: …'" || return
     for word in "$@"; do
-        [[ $stderr == *"$word"* ]] || fail "expected '$word'"
+        [[ $stderr == *"$word"* ]] || fail "expected '$word'" || return
     done
 }
 
@@ -205,7 +214,7 @@ compile() {
 in_order() {
     local stream=$1 rest=$2 text
     for text in "${@:3}"; do
-        [[ $rest == *"$text"* ]] || fail "expected '$text' on $stream"
+        [[ $rest == *"$text"* ]] || fail "expected '$text' on $stream" || return
         rest=${rest#*"$text"}
     done
 }
@@ -228,8 +237,7 @@ checked() {
         texts+=("$1")
         shift
     done
-    ends "$code" "${@:2}"
-    "$check" "${texts[@]}"
+    ends "$code" "${@:2}" && "$check" "${texts[@]}"
 }
 
 # succeed_saying TEXT … -- ARG …: runs the program, which succeeds and has the texts on standard error, in this order.
@@ -249,8 +257,7 @@ differ_printing() {
 
 # info_tells FILE TEXT …: what info prints of the file has the texts in this order.
 info_tells() {
-    succeed info "$1"
-    prints "${@:2}"
+    succeed info "$1" && prints "${@:2}"
 }
 
 # refuse_each WORD …: runs the program once for each line "CODE WORD … | ARG …" of standard input, with the ARGs behind the given

@@ -30,12 +30,9 @@ load helper
     prints 'c?[31m: failed' 'a?[31m.vdb: the bake ended'
 }
 
-@test "info tells a file's unit, and the size in metres" {
+@test "a file's unit and its size in metres are told, and --unit overrules by a name or in metres" {
     info_tells "$MODELS/scene.fbx" "unit: 0.01 m; bounds are in metres" "bounds: 0 2 -3 to 2 4 -1"
     info_tells "$MODELS/scene.obj" "unit: none"
-}
-
-@test "--unit overrules, by a name or in metres" {
     succeed_printing "bounds: 0 200 -300 to 200 400 -100" -- info --unit m "$MODELS/scene.fbx"
     succeed_printing "bounds: 0 0.0508 -0.0762 to 0.0508 0.1016 -0.0254" -- info --unit in "$MODELS/scene.obj"
     succeed_printing "bounds: 0 20 -30 to 20 40 -10" -- info --unit 10 "$MODELS/scene.obj"
@@ -53,6 +50,24 @@ load helper
     [[ $stderr != *blended* ]] || fail "the scene: $stderr"
     differ with.vdb without.vdb
     same with.vdb scene.vdb
+}
+
+# json_has FILE EXPRESSION …: what info --json prints of the file; each Python expression on root, the object, is true.
+json_has() {
+    succeed info "$1" --json
+    python3 -c 'import json, sys
+root = json.load(sys.stdin)
+sys.exit("\n".join(one for one in sys.argv[1:] if not eval(one)) or 0)' "${@:2}" <<<"$output" || fail "not so"
+}
+
+@test "--json prints the same facts as an object, and an error as ever" {
+    "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o box.exr
+    "$VDBSHADE" voxelize box.obj -o box.vdb --voxel-size 0.05 --quiet
+    json_has box.obj 'root["triangles"] == 12' 'root["meshes"][0]["name"] == "box"' 'root["meshes"][0]["bounds"] == [[0, 0, 0], [1, 1, 1]]'
+    json_has box.exr 'root["size"] == [32, 32]' 'root["channels"][-1]["name"] == "shadow.sun"' '"vdbshade_version" in root["attributes"]'
+    json_has box.vdb 'root["grids"][0]["class"] == "level set"' '"box.obj" in root["grids"][0]["attributes"]["vdbshade_input_0"]'
+    json_has "$ASSETS/seeds.json" 'root["casters"][0]["type"] == "sdf"' 'root["receivers"][0]["size"] == [512, 512]'
+    refuses 3 none.obj -- info none.obj --json
 }
 
 @test "what is not read is refused with what would help" {

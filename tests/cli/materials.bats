@@ -85,7 +85,7 @@ lit() {
     holds "(100 * $(mean_of "$1" shadow.sun) - $2) ^ 2 < 0.2 ^ 2"
 }
 
-@test "a texture beside the file, in it, and without the confined reader are one" {
+@test "a texture beside the file, in it, and without the confined reader are one, for any number of threads" {
     write_level within.gltf "$(leaf MASK)" "data:image/png;base64,$(base64 -w0 emblem.png)"
     bake masked.gltf beside.exr
     bake within.gltf within.exr
@@ -94,9 +94,6 @@ lit() {
     same beside.exr within.exr
     same beside.exr trusted.exr
     differ beside.exr whole.exr
-}
-
-@test "the same values for any number of threads" {
     bake masked.gltf one.exr --threads 1
     bake masked.gltf two.exr --threads 2
     same one.exr two.exr
@@ -191,14 +188,11 @@ JSON
     succeed_saying "2 of 3 meshes are one-sided, but voxels cast to both sides" -- bake scene.json --method cone --ao-method cones -o cone.exr
 }
 
-@test "in a lit asset a material that does not receive stays as it was" {
+@test "in a lit asset a material that does not receive stays as it was, and info says how it casts" {
     succeed bake masked.gltf --sun 0,1,0 --unwrap always --no-receive leaf --size 64 -o lit.gltf
     [ "$(show_gltf lit.gltf '["MOZ_lightmap" in str(one) for one in root["materials"] if one["name"] == "leaf"][0]')" = False ] || fail "the leaf"
     grep -q MOZ_lightmap lit.gltf || fail "nothing has a lightmap"
     succeed info lit.gltf
-}
-
-@test "info says how a material casts" {
     info_tells masked.gltf "masked (leaves, fences): it casts by its texture's alpha"
 }
 
@@ -248,11 +242,7 @@ inputs_are() {
 
 @test "parts of a bake and golden bakes are told from those of another texture" {
     mkdir scenes
-    cat >scenes/leaf.json <<'JSON'
-{"casters": [{"mesh": "../masked.gltf"}],
- "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 2}],
- "receivers": [{"mesh": "../masked.gltf", "objects": ["floor"], "size": 32, "output": "leaf.exr"}]}
-JSON
+    write_bake scenes/leaf.json '{"mesh": "../masked.gltf"}' '' '"mesh": "../masked.gltf", "objects": ["floor"], "size": 32'
     "$VDBSHADE" regress scenes --update --quiet
     bake masked.gltf part.exr --shard 1/2
     "$VDBSHADE" bake "$ASSETS/seeds_floor.obj" --sun 0,1,0 --size 8 -o emblem.png --quiet # which is opaque

@@ -37,7 +37,7 @@ again() {
     cmp v.vdb w.vdb
 }
 
-@test "a scene file is an input itself, and so is what it names" {
+@test "a scene file is an input itself, and so is what it names; words that a shell would split are quoted" {
     cat >scene.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}], "lights": [{"name": "key", "type": "sphere",
  "position": [2, 3, 1], "radius": 0.25}], "receivers": [{"mesh": "box.obj", "output": "box.exr", "size": 16}],
@@ -48,9 +48,6 @@ JSON
         "vdbshade_light_key: sphere at 2 3 1, radius 0.25" \
         "vdbshade_input_0: sha256:$(sha256sum <scene.json | cut -d' ' -f1) scene.json" \
         "vdbshade_input_1: sha256:$(sha256sum <box.obj | cut -d' ' -f1) box.obj"
-}
-
-@test "words that a shell would split are quoted" {
     write_box "my box.obj"
     succeed bake "my box.obj" -o box.exr --sun 1,2,1 --size 16 --resolution 16 --quiet
     info_tells box.exr "--resolution 16 'my box.obj'"

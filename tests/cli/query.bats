@@ -131,7 +131,7 @@ ANSWERS=(--distance --gradient --answers-only)
     awk -F, '$7 != 1 || $8 != 1 { bad = 1 } END { exit bad || NR != 8 }' out.csv
 }
 
-@test "without normals there is no ao, and no horizon" {
+@test "without normals there is no ao, and no horizon; nothing but answers goes to standard output" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
     succeed_saying "the points have no normals, so AO is left out" -- query scene.json --points p.csv -o out.csv
     [ "$(head -1 out.csv)" = x,y,z,shadow.sun ]
@@ -140,6 +140,10 @@ ANSWERS=(--distance --gradient --answers-only)
     refuses 2 "nothing to answer" -- query bare.json --points p.csv -o other.csv --quiet
     succeed query bare.json --points p.csv --distance -o other.csv --quiet
     [ "$(head -1 other.csv)" = x,y,z,distance ]
+    printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
+    succeed query scene.json --points p.csv --progress -o -
+    [ "${#lines[@]}" -eq 2 ] && [ "${lines[0]}" = x,y,z,shadow.sun ]
+    [[ $stderr == *voxelize* ]] || fail "no progress"
 }
 
 @test "the points of a PLY mesh without normals take those of its faces" {
@@ -327,13 +331,6 @@ CASES
     wait
     exec 8<&-
     [ ! -s err.txt ]
-}
-
-@test "nothing but answers goes to standard output" {
-    printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
-    succeed query scene.json --points p.csv --progress -o -
-    [ "${#lines[@]}" -eq 2 ] && [ "${lines[0]}" = x,y,z,shadow.sun ]
-    [[ $stderr == *voxelize* ]] || fail "no progress"
 }
 
 @test "a pipe or disk that takes no more ends the run" {

@@ -53,11 +53,13 @@ LIST
     refuses 2 --density -- unwrap box.obj -o out.obj --density 3
 }
 
-@test "the same file for any number of threads" {
+@test "the file is the same for any number of threads, and unwrap writes glTF, too: the input with another lightmap set" {
     for threads in 1 5; do
         succeed unwrap "$ASSETS/smooth.glb" -o "$threads.obj" --size 256 --threads "$threads" --quiet
     done
     cmp 1.obj 5.obj || fail "they differ"
+    succeed unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
+    info_tells out.glb "UV sets: 2"
 }
 
 @test "bad options and places are refused" {
@@ -74,28 +76,23 @@ LIST
     untouched out.obj
 }
 
-@test "unwrap writes glTF, too: the input with another lightmap set" {
-    succeed unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
-    info_tells out.glb "UV sets: 2"
-}
-
-@test "a mesh without lightmap UVs gets some where an asset is written" {
+@test "a mesh without lightmap UVs gets some for an asset; for an image it gets none unasked, and the error says how" {
     succeed bake bare.obj "${SMALL[@]}" --ao 1 -o lit.glb
     show_gltf lit.glb text | grep -q '"TEXCOORD_0".*"MOZ_lightmap"' || fail "no UVs, or no light"
-}
-
-@test "for an image it gets none unasked, and the error says how" {
     ends 2 bake bare.obj "${SMALL[@]}" -o x.exr
     says "--unwrap auto"
     succeed bake bare.obj "${SMALL[@]}" --unwrap auto -o x.exr
 }
 
-@test "UVs that can be baked are kept, and always replaces them" {
+@test "UVs that can be baked are kept, always replaces them, and a density packs them anew" {
     "$VDBSHADE" bake box.obj "${SMALL[@]}" -o plain.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap auto -o auto.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap always -o always.exr --quiet
     same plain.exr auto.exr
     differ plain.exr always.exr
+    succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
+    # six unit squares
+    holds "$(number_in many.json texels) >= 1536 && $(number_in many.json texels) <= 1850"
 }
 
 @test "objects that each fill the square are packed apart" {
@@ -122,12 +119,6 @@ LIST
     [[ $stderr != *"lie over"* && $stderr != *"sheet"* && $stderr != *"open edges"* ]] || fail "$stderr"
     # six squares of 20 texels and a border
     holds "$(number_in x.json texels) >= 2400 && $(number_in x.json texels) <= 2904"
-}
-
-@test "UVs that can be baked are packed anew where a density is asked for" {
-    succeed bake box.obj "${SMALL[@]}" --size 64 --unwrap auto --texels-per-unit 16 -o many.exr --stats many.json
-    # six unit squares
-    holds "$(number_in many.json texels) >= 1536 && $(number_in many.json texels) <= 1850"
 }
 
 @test "info tells density and stretch of UVs, and what auto would do" {

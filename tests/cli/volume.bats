@@ -8,9 +8,11 @@ prepare() {
     SUN=(--sun 0.3,1,0.2 --sun-angle 5)
 }
 
-@test "a scene's band has a grid for each light, and ao" {
+@test "a scene's band has a grid for each light, ao and their errors" {
     succeed_saying "out.vdb: 2 grids of " " voxels" -- volume scene.json -o out.vdb
     info_tells out.vdb "grid 'shadow.sun'" "class: unknown" "voxel size: 0.1 0.1 0.1" "background: 1" "grid 'ao'"
+    succeed volume scene.json -o out.vdb --max-error 0.1 --error --quiet
+    info_tells out.vdb shadow.sun "'ao'" error.sun error.ao
 }
 
 @test "a mesh's band is the level set's, or narrower" {
@@ -60,11 +62,6 @@ prepare() {
     succeed volume scene.json --method cone --ao-method cones -o half.vdb --half --quiet
     [ "$(stat -c %s half.vdb)" -lt "$(($(stat -c %s 1.vdb) * 19 / 20))" ] || fail "not smaller"
     info_tells half.vdb Tree_float_5_4_3
-}
-
-@test "errors have grids of their own" {
-    succeed volume scene.json -o out.vdb --max-error 0.1 --error --quiet
-    info_tells out.vdb shadow.sun "'ao'" error.sun error.ao
 }
 
 @test "a dry run tells voxels and memory, and bakes nothing" {

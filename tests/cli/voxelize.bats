@@ -7,17 +7,11 @@ prepare() {
     sed '$d' box.obj | sed '$d' >crate.obj
 }
 
-@test "a mesh becomes a level set of the voxel size and band asked for" {
+@test "meshes and scenes become a level set of the voxel size, resolution along the longest side and band asked for" {
     succeed_saying "out.vdb: voxel 0.04, " "active voxels" -- voxelize box.obj -o out.vdb --voxel-size 0.04 --half-width 5
     succeed_printing "grid 'surface'" "voxel size: 0.04 0.04 0.04" "(5 voxels)" -- info out.vdb
-}
-
-@test "a resolution is counted along the longest side" {
     succeed voxelize box.obj -o out.vdb --resolution 50 --quiet
     info_tells out.vdb "voxel size: 0.02 0.02 0.02"
-}
-
-@test "a scene's casters become one level set" {
     succeed voxelize "$ASSETS/seeds.json" -o seeds.vdb --voxel-size 0.1 --quiet
     info_tells seeds.vdb "class: level set"
 }
@@ -136,14 +130,11 @@ write_studs() {
     [[ $stderr != *"are invalid"* ]] || fail "$stderr"
 }
 
-@test "solid, shell and inward overrule what is found" {
+@test "solid, shell and inward overrule what is found, and a pattern that matches nothing is refused with names" {
     succeed_saying "baked as a shell" -- voxelize crate.obj --verbose -o crate.vdb --resolution 32
     succeed_saying "closed over the holes" -- voxelize crate.obj --verbose -o crate.vdb --resolution 32 --treat '*=solid'
     succeed_saying "baked as a shell" -- voxelize box.obj --verbose -o shell.vdb --resolution 32 --treat 'b*=sheet' --treat 'box=sheet'
     succeed_saying "triangles that face the other way" -- voxelize box.obj --verbose -o wall.vdb --resolution 32 --treat box=room
-}
-
-@test "a pattern that matches nothing is refused with names" {
     refuses 2 "no object is named 'bix'" -- voxelize box.obj -o out.vdb --treat 'bix=solid'
     [[ $stderr == *"did you mean 'box'"* ]] || fail "no name"
     [ ! -e out.vdb ] || fail "written all the same"

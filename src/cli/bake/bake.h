@@ -65,7 +65,7 @@ typedef struct cli_bake_settings {
     double light_radius;
     const char *lights; /* a file, or CLI_LIGHTS_OF_INPUT; NULL: none */
     double floor[5];    /* W, D, X, Y, Z; W 0: none */
-    double height;      /* of a terrain; these two 0: not given */
+    double height;      /* a terrain's; 0: not given, as world[0] */
     double world[2];    /* world[1] 0: the image's shape decides */
     bool preview, per_object, dry_run;
     int32_t shard[2];         /* number and count of the part; 0: all of it */

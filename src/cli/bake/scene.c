@@ -118,7 +118,7 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
     return CLI_OK;
 }
 
-/* What stands for the object's name in an output's path. */
+/* The object's name replaces this in an output's path. */
 #define OBJECT_NAME "%s"
 
 /* Whether an output is for many objects: a folder, a path with OBJECT_NAME, or one without an ending. */
