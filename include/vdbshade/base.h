@@ -1,13 +1,8 @@
 /* Results, errors, and options of a run: what all calls share.
  *
- *     static void warn(void *user, const char *message) {
- *         (void)user;
- *         fprintf(stderr, "%s\n", message);
- *     }
- *
  *     vsh_run run = vsh_run_default();
  *     run.threads = 4;
- *     run.warning = warn;
+ *     run.warning = print_warning; // a vsh_warning_fn
  *     run.reader = VSH_READER; // parse files in a confined process
  *     vsh_error error;
  *     vsh_model *model;
@@ -18,33 +13,34 @@
  * These rules hold for every call:
  *
  * - The library prints nothing, never exits, and keeps no mutable global state. Only calls that take a
- * vsh_run start threads. OpenVDB is loaded with the first level set, OpenImageIO with the first image other
- * than EXR and PNG, Embree with the first rays against triangles. They stay loaded; liblog4cplus keeps four
- * waiting threads. VSH_ERROR_UNSUPPORTED if a library is missing.
+ *   vsh_run start threads. OpenVDB is loaded with the first level set, OpenImageIO with the first image
+ *   other than EXR and PNG, Embree with the first rays against triangles. They stay loaded; liblog4cplus
+ *   keeps four waiting threads. VSH_ERROR_UNSUPPORTED if a library is missing.
  * - A call that can fail returns a vsh_result and fills the caller's vsh_error.
  * - Any thread may call any function at any time. Handles do not change once made, and threads may share
- * them. Free each handle once, when no call uses it.
+ *   them. Free each handle once, when no call uses it.
  * - Pointers must not be NULL unless the docs allow it. Exceptions: arrays without elements, and parameters
- * named options, run, stats, report or error. NULL options and a NULL run mean their …_default(). Calls that
- * return a vsh_result answer any other NULL with VSH_ERROR_ARGUMENT.
+ *   named options, run, stats, report or error. NULL options and a NULL run mean their …_default(). Calls
+ *   that return a vsh_result answer any other NULL with VSH_ERROR_ARGUMENT.
  * - Arrays and structs that you pass in stay yours. The library does not use them after the call, unless the
  *   docs call them views.
  * - Voxels are stored as [depth][height][width]: x fastest, then y, then z. Image rows are stored likewise.
  * - A call that makes a handle sets it to NULL if it fails.
- * - Structs of options begin with struct_size. Their …_default() or …_zero() function sets it. Later versions
- * may append members, and older programs keep working. All else may change with the minor version, which is
- * the library's soname. VSH_ERROR_ARGUMENT if struct_size is 0 or larger than the library knows.
+ * - Structs of options begin with struct_size. Their …_default() or …_zero() function sets it. Later
+ *   versions may append members, and older programs keep working. All else may change with the minor
+ *   version, which is the library's soname. VSH_ERROR_ARGUMENT if struct_size is 0 or larger than the
+ *   library knows.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps) and
  *   restore the caller's. Callbacks run in the default one.
  * - Every call works on a stack of 128 KiB, of a thread or a fibre. With less than 2 MiB left it runs on
- * threads of its own, which adds up to a millisecond. Callbacks then come from those threads.
+ *   threads of its own, which adds up to a millisecond. Callbacks then come from those threads.
  * - Libraries that parse .vdb files, meshes, images and fonts can crash on damaged ones. With vsh_run.reader
- * they run in a confined child process, and the caller checks everything that comes back. posix_spawn()
- * starts the child, so this is safe in hosts with threads and locks. Without a reader, read only files that
- * you trust.
+ *   they run in a confined child process, and the caller checks everything that comes back. posix_spawn()
+ *   starts the child, so this is safe in hosts with threads and locks. Without a reader, read only files
+ *   that you trust.
  * - VSH_ERROR_MEMORY and VSH_ERROR_INTERNAL can come from every call that returns a vsh_result, and
  *   VSH_ERROR_CANCELLED from every one that takes a run. The docs of each call list the others.
- * "VSH_ERROR_ARGUMENT: run" means a member of vsh_run out of range. */
+ *   "VSH_ERROR_ARGUMENT: run" means a member of vsh_run out of range. */
 #ifndef VDBSHADE_BASE_H
 #define VDBSHADE_BASE_H
 
@@ -104,7 +100,7 @@ typedef struct vsh_attribute {
 } vsh_attribute;
 
 /* Receives the progress of a call: a stage ("load", "outline", "voxelize", "field", "charts", "texels",
- * "validate", "shadow.NAME", "ao", "padding", "volume", "flat", "hash", "compare", "page", "unwrap", "pack",
+ * "shadow.NAME", "ao", "padding", "volume", "flat", "hash", "compare", "page", "unwrap", "pack",
  * "lit", "parts", "merge") and the fraction of it that is done, 0 … 1, which never falls within a stage. One
  * thread calls it at a time, but any thread of the pool may. Return 0 to continue, anything else to cancel:
  * the call then frees its memory and returns VSH_ERROR_CANCELLED. At a fraction of 1 the library may ignore
@@ -200,14 +196,15 @@ VSH_API vsh_result vsh_file_digest(const char *path, const vsh_run *run, char di
  * A call with vsh_run.reader starts that program for each file and waits. The child confines all its threads
  * before it loads the libraries that parse, and before it opens the file:
  *
- * - Limits (VSH_CONFINED_LIMITS) of data, processor time and descriptors; no core dump, no new privileges; it
- * ends with its parent. Data may be run->memory_limit, plus 68 MiB for the program (176 for images) and a
- * stack for each core. Without a limit, it may be the machine's memory.
+ * - Limits (VSH_CONFINED_LIMITS) of data, processor time and descriptors; no core dump, no new privileges;
+ *   it ends with its parent. Data may be run->memory_limit, plus 68 MiB for the program (176 for images) and
+ *   a stack for each core. Without a limit, it may be the machine's memory.
  * - Calls (VSH_CONFINED_CALLS): a seccomp filter allows reading files, memory and its own threads. It allows
- * no sockets, programs, writing or signals. The parent asks the kernel whether every thread has the filter.
+ *   no sockets, programs, writing or signals. The parent asks the kernel whether every thread has the
+ *   filter.
  * - Files (VSH_CONFINED_FILES): Landlock (Linux 5.13) allows the file, the folder of a model, and libraries.
- * The memory and environment of other processes are closed. The child's environment keeps only variables of
- * the dynamic linker, of locales and of sanitizers.
+ *   The memory and environment of other processes are closed. The child's environment keeps only variables
+ *   of the dynamic linker, of locales and of sanitizers.
  *
  * If the system refuses one of them (an old kernel, a container), the others still hold. A warning says what
  * is missing, except for files, which many systems cannot confine. run->confined makes it an error.
@@ -216,7 +213,7 @@ VSH_API vsh_result vsh_file_digest(const char *path, const vsh_run *run, char di
  * memory and checks sizes, counts, indices, finite values, transforms and strings before it uses them.
  *
  * - A crash is VSH_ERROR_READ ("PATH: damaged: the reader crashed (SIGSEGV)"). A file that takes too long or
- * too much memory is VSH_ERROR_LIMIT.
+ *   too much memory is VSH_ERROR_LIMIT.
  * - Cancelling kills the child at once. */
 
 /* A reader's only argument. */

@@ -2,7 +2,15 @@
  *
  * A plain RMSE hardly notices lost penumbrae. So there is one measure for each way in which bakes go wrong:
  * wider penumbrae, shifted values, shadows without their casters. docs/pipeline.md has the formulas, their
- * sources, and what each measure cannot see. */
+ * sources, and what each measure cannot see. *
+ *     vsh_comparison *comparison;
+ *     const vsh_channel_comparison *channel;
+ *     vsh_compare_files("golden.exr", "new.exr", NULL, &run, &comparison, &error);
+ *     for (size_t i = 0; (channel = vsh_comparison_channel(comparison, i)) != NULL; ++i) {
+ *         printf("%s: %s\n", channel->name, channel->alike ? "alike" : "not alike");
+ *     }
+ *     vsh_comparison_free(comparison);
+ */
 #ifndef VDBSHADE_COMPARE_H
 #define VDBSHADE_COMPARE_H
 

@@ -42,7 +42,7 @@ static inline vsh_grid_options vsh_grid_options_default(void) {
  * - VSH_ERROR_ARGUMENT: no meshes, options out of range, run, and as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle with area;
  * - VSH_ERROR_LIMIT: memory beyond run->memory_limit or the machine's; a voxel size outside 1e-12 … 1e12;
- * more than 2^29 voxels along a side or 1e12 from the origin; more than 2^31 - 1 triangles;
+ *   more than 2^29 voxels along a side or 1e12 from the origin; more than 2^31 - 1 triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count,
                                         const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
@@ -60,8 +60,8 @@ VSH_API vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options 
 /* Extrudes an outline from z = -thickness / 2 to thickness / 2, with true distances. `transform` [12], local
  * to world, three rows of four: rotation, translation, mirroring and uniform scale (to 1e-6); NULL: identity.
  * Errors:
- * - VSH_ERROR_ARGUMENT: outline or grid NULL, thickness (local units, > 0 … 1e15), another transform, options
- * out of range, run;
+ * - VSH_ERROR_ARGUMENT: outline or grid NULL, thickness (local units, > 0 … 1e15), another transform,
+ *   options out of range, run;
  * - VSH_ERROR_INPUT: a solid too thin for the voxels;
  * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -87,7 +87,7 @@ typedef struct vsh_distance {
 /* Makes a level set of a callback. Errors:
  * - VSH_ERROR_ARGUMENT: field or callback NULL, lipschitz or bounds, options out of range, run;
  * - VSH_ERROR_INPUT: the callback returns a value that is not finite; there is no surface; the bounds are a
- * point and options give a resolution;
+ *   point and options give a resolution;
  * - VSH_ERROR_LIMIT: as vsh_grid_from_meshes();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
@@ -109,8 +109,8 @@ VSH_API vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distan
  * from the zero surface, with a warning. Use run->reader for files from strangers. Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: no such file, no permission, no .vdb file, cut short, a newer format, damaged;
- * - VSH_ERROR_INPUT: no grids; none of that name; a grid that is no level set of floats or doubles, is scaled
- *   unevenly, sheared, inside out, without a surface, or has values that are not finite;
+ * - VSH_ERROR_INPUT: no grids; none of that name; a grid that is no level set of floats or doubles, is
+ *   scaled unevenly, sheared, inside out, without a surface, or has values that are not finite;
  * - VSH_ERROR_LIMIT: memory beyond run->memory_limit or the machine's;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,

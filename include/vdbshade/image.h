@@ -51,7 +51,7 @@ enum {
     VSH_COLOR_ENCODED = 3 /* already encoded: the file only says sRGB */
 };
 
-/* How much light the integers of a file cut off. */
+/* Light that the integers of a file cut off. */
 typedef struct vsh_image_clipping {
     uint64_t texels;  /* with A above 0, if the image has A; 0 if no light is stored as integers */
     uint64_t clipped; /* of them with R, G or B over 1 */
@@ -86,7 +86,7 @@ static inline vsh_image_options vsh_image_options_default(void) {
  * "vdbshade_color_space" ("sRGB" or "linear"); PNG, TIFF and JPEG also mark sRGB in their own way. Atomic:
  * the file is renamed into place when it is complete. Errors:
  * - VSH_ERROR_ARGUMENT: path NULL or empty, no image, sizes or channels out of range, a plane NULL, options,
- * bad attributes, an unknown ending; bits, a pack or a size that the format lacks;
+ *   bad attributes, an unknown ending; bits, a pack or a size that the format lacks;
  * - VSH_ERROR_LIMIT: more than 2^31 values, or 2 GiB in 16 rows of EXR;
  * - VSH_ERROR_WRITE: no such folder, no permission, a folder or device in the way, disk full;
  * - VSH_ERROR_UNSUPPORTED: this OpenImageIO cannot write the format;
@@ -110,9 +110,9 @@ typedef struct vsh_image_file vsh_image_file;
  * - VSH_ERROR_READ: no such file, no permission, a folder; damaged, cut short; the reader crashed;
  * - VSH_ERROR_INPUT: an ending of no known format;
  * - VSH_ERROR_UNSUPPORTED: deep, volume and subsampled images; compressions and formats that the installed
- * libraries lack;
+ *   libraries lack;
  * - VSH_ERROR_LIMIT: more than 2^31 values or VSH_MAX_CHANNELS channels; run->memory_limit; the reader's
- * time;
+ *   time;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file **file,
                                   vsh_error *error);

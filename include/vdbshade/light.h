@@ -306,15 +306,14 @@ VSH_API void vsh_query_free(vsh_query *query); /* NULL does nothing */
 typedef struct vsh_query_output {
     size_t struct_size;
     float *const *visibility; /* [light_count] arrays [count]; each, or all, may be NULL */
-    float *const
-        *deviation; /* [light_count] arrays [count]: standard errors of visibilities that are asked for */
-    float *ao;      /* [count]; needs normals */
-    float *ao_deviation; /* [count], with `ao` */
-    float *distance;     /* [count], signed, world units, of the point itself without start offset; NaN if its
-                            position is not finite */
-    float *gradient;     /* [count][3], unit: the direction of growing distance, which is the normal next to a
-                            surface and some degrees off beyond the finest band. 0 if the field has none (beyond
-                            its reach, at the centre of a sphere); NaN if the position is not finite */
+    float *const *deviation;  /* [light_count] arrays [count]: standard errors of the visibilities */
+    float *ao;                /* [count]; needs normals */
+    float *ao_deviation;      /* [count], with `ao` */
+    float *distance; /* [count], signed, world units, of the point itself without start offset; NaN if its
+                        position is not finite */
+    float *gradient; /* [count][3], unit: the direction of growing distance, which is the normal next to a
+                        surface and some degrees off beyond the finest band. 0 if the field has none (beyond
+                        its reach, at the centre of a sphere); NaN if the position is not finite */
     size_t stride; /* bytes between the values of consecutive points in every array, a multiple of 4, at least
                       4 (with `gradient` 12); 0: packed */
 } vsh_query_output;

@@ -125,11 +125,11 @@ typedef struct vsh_atlas vsh_atlas;
  * scale share a layout, and objects that differ likewise are packed alike. A mesh is spread over pages only
  * if it does not fit one. Values do not depend on threads. Stages: "unwrap", "pack". Free the result with
  * vsh_atlas_free(). Errors:
- * - VSH_ERROR_ARGUMENT: meshes or atlas NULL, no meshes or more than 2^32 - 1, options out of range, run, and
- * as vsh_mesh_check();
+ * - VSH_ERROR_ARGUMENT: meshes or atlas NULL, no meshes or more than 2^32 - 1, options out of range, run,
+ *   and as vsh_mesh_check();
  * - VSH_ERROR_INPUT: as vsh_mesh_check(); no triangle with area;
  * - VSH_ERROR_LIMIT: run->memory_limit; charts that do not fit into max_pages (the message gives a density
- * that fits); more than 2^32 / 3 triangles in a mesh;
+ *   that fits); more than 2^32 / 3 triangles in a mesh;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
                               const vsh_run *run, vsh_atlas **atlas, vsh_error *error);
@@ -202,7 +202,7 @@ typedef struct vsh_charts vsh_charts;
  * the order of meshes and triangles keeps the texel. Warns about what the reports hold; `uv_reports`
  * [mesh_count] may be NULL. Free the result with vsh_charts_free(). Errors:
  * - VSH_ERROR_ARGUMENT: charts or meshes NULL, no meshes or more than 2^30 - 1, sizes out of range, run, and
- * as vsh_mesh_check();
+ *   as vsh_mesh_check();
  * - VSH_ERROR_INPUT: a mesh without UVs, UVs that are not finite, and as vsh_mesh_check();
  * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^32 - 2 triangles;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -325,7 +325,7 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
  * Rays start start_offset + surface_offset above the surface (at least a voxel in creases), and on sheets
  * half the field's shell_thickness farther. Errors (the planes are then undefined):
  * - VSH_ERROR_ARGUMENT: occluders, charts or lightmap NULL, lights NULL with a count above 0, options out of
- * range, run, and as vsh_light_check();
+ *   range, run, and as vsh_light_check();
  * - VSH_ERROR_LIMIT: run->memory_limit, for occluders, charts and the bake;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_charts *charts,

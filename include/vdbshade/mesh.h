@@ -103,9 +103,10 @@ typedef struct vsh_mesh_report {
 } vsh_mesh_report;
 
 /* Checks a mesh, except its UVs and normals. Errors (*report is then unchanged):
- * - VSH_ERROR_ARGUMENT: mesh or report NULL; an array NULL whose count is not 0; more than 2^32 - 1 vertices;
+ * - VSH_ERROR_ARGUMENT: mesh or report NULL; an array NULL whose count is not 0; more than 2^32 - 1
+ *   vertices;
  * - VSH_ERROR_INPUT: a vertex that is not finite, before or after its transform; an index out of range; a
- * transform that is not finite or flattens;
+ *   transform that is not finite or flattens;
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 
@@ -150,11 +151,11 @@ typedef struct vsh_model vsh_model;
  * note. It warns about normals that are not finite (flat there) and polygons whose edges cross. Errors:
  * - VSH_ERROR_ARGUMENT: path or model NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, damaged; a glTF's buffer
- * is missing;
+ *   is missing;
  * - VSH_ERROR_UNSUPPORTED: a glTF of another version, or that requires an unknown extension;
  * - VSH_ERROR_INPUT: no ending or an unknown one (.blend, Alembic and USD are named); no triangles; vertices
- * that are not finite; indices out of range; a damaged header or JSON; a file outside the model's folder
- * (run->allow_outside);
+ *   that are not finite; indices out of range; a damaged header or JSON; a file outside the model's folder
+ *   (run->allow_outside);
  * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for each of the file), nodes nested over 1024 deep;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error);
@@ -204,7 +205,7 @@ enum {
  * - VSH_ERROR_ARGUMENT: source, values or model NULL, sizes or `what` out of range, run;
  * - VSH_ERROR_INPUT: a value that is not finite, before or after scaling, by its row and column;
  * - VSH_ERROR_LIMIT: more than 2^32 - 1 vertices; run->memory_limit (36 bytes a sample for a solid, 56 for a
- * surface);
+ *   surface);
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what, const vsh_run *run,
                                           vsh_model **model, vsh_error *error);

@@ -136,7 +136,7 @@ typedef struct vsh_picture {
  * Pictures do not depend on threads or instruction sets. Stage: "render". `stats` includes camera rays.
  * Errors (the planes are then undefined):
  * - VSH_ERROR_ARGUMENT: picture or occluders NULL; surfaces or lights NULL with a count above 0; more than
- * VSH_MAX_SURFACES; options out of range; run; as vsh_camera_check() and vsh_query_create();
+ *   VSH_MAX_SURFACES; options out of range; run; as vsh_camera_check() and vsh_query_create();
  * - VSH_ERROR_INPUT: lit meshes as vsh_mesh_check(), or without UVs; a lightmap without the channels above;
  * - VSH_ERROR_LIMIT: fields, lit meshes and rendering exceed run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -300,7 +300,7 @@ typedef struct vsh_flat_map {
  * ignored; its radius is that of a disc, and a spot's angles lie in the plane. A point inside a light's disc
  * sees all of it. Errors (the planes then hold nothing of use):
  * - VSH_ERROR_ARGUMENT: scene or map NULL; options out of range; a light that vsh_light_check() refuses or
- * whose direction has no length in the plane (the message gives its number); a caster of no type; run;
+ *   whose direction has no length in the plane (the message gives its number); a caster of no type; run;
  * - VSH_ERROR_INPUT, VSH_ERROR_READ, VSH_ERROR_UNSUPPORTED: a caster's image, font, text or polygon;
  * - VSH_ERROR_LIMIT: run->memory_limit; with VSH_FLAT_CLASSIC more than 2^31 distances in its grid;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */

@@ -253,7 +253,7 @@ static inline vsh_scene vsh_scene_default(void) {
  * - VSH_ERROR_ARGUMENT: path or scene NULL, run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT, with line and column: no JSON, an unknown or missing key, a value of the wrong type or
- * out of range;
+ *   out of range;
  * - VSH_ERROR_LIMIT: a file over 64 MiB, or values beyond run->memory_limit;
  * - as vsh_lights_read();
  * - VSH_ERROR_MEMORY. */
@@ -333,12 +333,12 @@ typedef struct vsh_assets vsh_assets;
 /* Reads the files that a scene names, receivers first, and applies transforms. The scene need not outlive the
  * call. Free the result with vsh_assets_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene or assets NULL; an unknown type; a caster or receiver without a path, or whose
- * transform is not finite or flattens; a UV set out of range; run;
+ *   transform is not finite or flattens; a UV set out of range; run;
  * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set; a pattern that matches no mesh, or
- * patterns that leave none; a caster with blended meshes only, without scene->cast_blended; an image one
- * pixel across; bad files;
+ *   patterns that leave none; a caster with blended meshes only, without scene->cast_blended; an image one
+ *   pixel across; bad files;
  * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file), VSH_ERROR_UNSUPPORTED: as the calls that read single
- * files;
+ *   files;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                                    vsh_error *error);
@@ -366,8 +366,8 @@ VSH_API vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const
  * scene->grid's, else by its resolution over all casters, else that of the finest level set among them.
  * `assets` were loaded for this scene. Errors:
  * - VSH_ERROR_ARGUMENT: scene, assets or grid NULL, scene->grid out of range, run;
- * - VSH_ERROR_INPUT: no voxelized casters, casters without extent, a transform that shears or scales a caster
- * other than a mesh unevenly; as the vsh_grid_from_… calls;
+ * - VSH_ERROR_INPUT: no voxelized casters, casters without extent, a transform that shears or scales a
+ *   caster other than a mesh unevenly; as the vsh_grid_from_… calls;
  * - VSH_ERROR_LIMIT: as the vsh_grid_from_… calls;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
@@ -404,7 +404,7 @@ static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(vo
  * Errors, with the layer's name:
  * - VSH_ERROR_ARGUMENT: scene, assets or occluders NULL, half a box, options, run;
  * - VSH_ERROR_INPUT: no casters; more than 128 layers and direct casters; as vsh_scene_casters() and
- * vsh_occluders_create();
+ *   vsh_occluders_create();
  * - VSH_ERROR_LIMIT: as these;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
@@ -437,13 +437,13 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
  * - vdbshade_version: "0.2.0";
  * - vdbshade_command;
  * - vdbshade_shadow: "exact, max error 0.02, 64 rays, sobol"; vdbshade_ao: "cones, 16 within 2";
- * vdbshade_sky: "exact over y, max error 0.02, sobol";
+ *   vdbshade_sky: "exact over y, max error 0.02, sobol";
  * - vdbshade_light_NAME: type, place and size of each light;
  * - vdbshade_voxel_size;
  * - those of the source;
  * - vdbshade_input_N: "sha256:… NAME" of each input, from 0: the source's files, files of casters and
- * receivers, and files that those name, each once. Files outside their model's folder need
- * run->allow_outside. */
+ *   receivers, and files that those name, each once. Files outside their model's folder need
+ *   run->allow_outside. */
 typedef struct vsh_provenance vsh_provenance;
 
 /* Reads and hashes every input. Free the result with vsh_provenance_free(). Errors:
@@ -677,12 +677,12 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  *
  * Stage: "lit". All files are renamed into place when they are complete. Errors:
  * - VSH_ERROR_ARGUMENT: model, output or an array NULL; options, run; another ending; a mesh that does not
- * fit the model's; a chart, page, set or image out of range; two images of one page and purpose; UVs that are
- * not finite; an output that would replace an input, or a foreign OUT.mtl;
+ *   fit the model's; a chart, page, set or image out of range; two images of one page and purpose; UVs that
+ *   are not finite; an output that would replace an input, or a foreign OUT.mtl;
  * - VSH_ERROR_INPUT: a document that is not well formed, or not the model's;
  * - VSH_ERROR_READ: as vsh_model_read(); a short or missing buffer;
  * - VSH_ERROR_LIMIT: run->memory_limit; a GLB of 4 GiB or more; a primitive with VSH_MAX_UV_SETS sets of its
- * own;
+ *   own;
  * - VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                                  const vsh_lit_options *options, const char *output, const vsh_run *run,

@@ -38,7 +38,7 @@ VSH_API vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const
  * centre of voxel (i, j, k), from 0, is box_min + voxel_size × (i + 1/2, j + 1/2, k + 1/2). Errors:
  * - VSH_ERROR_ARGUMENT: bounds that are not finite, box_max not above box_min, voxel_size not above 0, run;
  * - VSH_ERROR_LIMIT: voxels below 1.45e-5 world units, which OpenVDB cannot write, more than 2^28 along a
- * side or 1e12 from the origin; run->memory_limit, or the machine's memory;
+ *   side or 1e12 from the origin; run->memory_limit, or the machine's memory;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
                                        const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
@@ -48,7 +48,7 @@ VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_INPUT: no grids, none of that name, one without numbers (vectors, points, text) or active
- * voxels, a voxel beyond ±2^28, a transform that is not finite;
+ *   voxels, a voxel beyond ±2^28, a transform that is not finite;
  * - VSH_ERROR_LIMIT: memory beyond run->memory_limit or the machine's;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run *run,
@@ -108,8 +108,8 @@ static inline vsh_volume_options vsh_volume_options_default(void) {
  * single points within their error. Stage: "volume"; `stats` are added to. Free the result with
  * vsh_volume_free(). Errors:
  * - VSH_ERROR_ARGUMENT: occluders or voxels NULL; lights NULL with a count above 0; nothing to bake; lights
- * without names or with equal ones; options out of range; AO by taps, or with layers of heights or spheres,
- * in free space; run; and as vsh_query_create();
+ *   without names or with equal ones; options out of range; AO by taps, or with layers of heights or
+ *   spheres, in free space; run; and as vsh_query_create();
  * - VSH_ERROR_LIMIT: occluders, voxels and grids beyond run->memory_limit or the machine's memory;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *voxels,
@@ -165,7 +165,8 @@ VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, 
 namespace vdbshade {
 
 /* Copies a level set into a handle. The rules of vsh_grid_read() for transforms and distances apply. Errors:
- * - VSH_ERROR_UNSUPPORTED: this program was compiled against another version or ABI of OpenVDB than vdbshade;
+ * - VSH_ERROR_UNSUPPORTED: this program was compiled against another version or ABI of OpenVDB than
+ *   vdbshade;
  * - VSH_ERROR_ARGUMENT: no grid, run;
  * - VSH_ERROR_INPUT, VSH_ERROR_LIMIT: as vsh_grid_read();
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */

@@ -677,8 +677,8 @@ vsh_image_options vshi_receiver_image(const vsh_receiver *receiver) {
 }
 
 /* Opens the page's image, or the EXR beside an asset; *writer is NULL if there is neither. */
-static vsh_result open_image(const vshi_scene_page *page, bool is_lit, vshi_image_writer **writer,
-                             vsh_error *error) {
+static vsh_result open_image(const vshi_scene_page *page, bool is_lit, vsh_image_clipping *clipping,
+                             vshi_image_writer **writer, vsh_error *error) {
     const vshi_scene_bake *bake = page->bake;
     const vsh_scene_lightmap *lightmap = page->target->lightmap;
     const char *file = is_lit ? bake->options.lit_exr : lightmap->output;
@@ -693,6 +693,7 @@ static vsh_result open_image(const vshi_scene_page *page, bool is_lit, vshi_imag
     vsh_image_options options =
         is_lit ? vsh_image_options_default() : vshi_receiver_image(&page->target->receiver);
     options.attributes = vsh_provenance_attributes(bake->provenance, &options.attribute_count);
+    options.clipping = clipping;
     const vsh_result result = vshi_image_writer_create(path, &page->channels.image, &options, writer, error);
     free(path);
     return result;
@@ -739,11 +740,10 @@ vsh_result vshi_write_page(const vshi_scene_page *page, vsh_error *error) {
     vshi_image_writer *writer = NULL;
     vsh_image_clipping cut = {.clipped = 0};
     vsh_result result;
-    VSHI_TRY_DONE(open_image(page, is_lit, &writer, error));
+    VSHI_TRY_DONE(open_image(page, is_lit, &cut, &writer, error));
     VSHI_TRY_DONE(write_rows(page, writer, error));
     VSHI_TRY_DONE(is_lit ? keep_lit_page(page, error) : VSH_OK);
     if (writer != NULL) {
-        VSHI_TRY_DONE(vshi_image_writer_get_clipping(writer, &cut, error));
         result = vshi_image_writer_finish(writer, error);
         writer = NULL;
         VSHI_TRY_DONE(result);

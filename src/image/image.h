@@ -33,10 +33,6 @@ vsh_result vshi_image_writer_create(const char *path, const vsh_image *image,
 vsh_result vshi_image_writer_add(vshi_image_writer *writer, int32_t rows, const float *const *planes,
                                  vsh_error *error);
 
-/* Errors: VSH_ERROR_ARGUMENT (an argument is NULL). */
-vsh_result vshi_image_writer_get_clipping(const vshi_image_writer *writer, vsh_image_clipping *clipping,
-                                          vsh_error *error);
-
 /* Puts the file in place and frees the writer, also where it fails; the old file is then as it was. Errors:
  * VSH_ERROR_ARGUMENT (rows are missing), and as vshi_image_writer_add(). */
 vsh_result vshi_image_writer_finish(vshi_image_writer *writer, vsh_error *error);
@@ -44,11 +40,11 @@ vsh_result vshi_image_writer_finish(vshi_image_writer *writer, vsh_error *error)
 /* Frees the writer; the old file is as it was. NULL does nothing. */
 void vshi_image_writer_abandon(vshi_image_writer *writer);
 
-/* Bytes that writing takes at most, beside the planes: some rows, or in formats that OpenImageIO writes from
- * memory only the whole image. 0 where vsh_image_check() has objections to what is given. */
+/* Returns the most bytes that writing takes beside the planes: some rows, or the whole image if OpenImageIO
+ * writes the format from memory only. 0 if vsh_image_check() fails. */
 uint64_t vshi_image_writer_bytes(const char *path, const vsh_image *image, const vsh_image_options *options);
 
-/* The packing that is used where none is given, as text: irradiance.R, .G and .B, or else the first three
+/* Writes the default packing as text: irradiance.R, .G and .B, or else the first three
  * channels that are not "A" to R, G, B (one alone: to R, G and B), "A" to A, which is left out where the
  * format has no alpha. Writes at most `capacity` bytes, NUL included. */
 void vshi_image_default_pack(const vsh_image *image, char *text, size_t capacity);

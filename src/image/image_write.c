@@ -227,6 +227,7 @@ typedef struct write_plan {
     vshi_planes planes;                /* without values; names are the image's, or static */
     int32_t channel[VSH_MAX_CHANNELS]; /* of the image, for each plane; -1: the plane's constant, or grey */
     picture picture;                   /* of planes that are grey */
+    vsh_image_clipping *clipping;      /* the caller's; may be NULL */
 } write_plan;
 
 static int32_t find_content(const vsh_image *image, int32_t channel) {
@@ -503,6 +504,7 @@ static vsh_result make_plan(const char *path, const vsh_image *image, const vsh_
     VSHI_TRY(plan_bits(path, full.bits, plan, error));
     VSHI_TRY(plan_planes(path, image, full.pack, plan, error));
     VSHI_TRY(plan_colors(path, image, full.color_space, plan, error));
+    plan->clipping = full.clipping;
     plan->planes.attributes = full.attributes;
     plan->planes.attribute_count = full.attribute_count;
     return vshi_attributes_check(path, full.attributes, full.attribute_count, error);
@@ -609,14 +611,6 @@ static void count_clipped(vshi_image_writer *writer, size_t texels, const float 
     }
 }
 
-vsh_result vshi_image_writer_get_clipping(const vshi_image_writer *writer, vsh_image_clipping *clipping,
-                                          vsh_error *error) {
-    VSHI_NEEDS(writer);
-    VSHI_NEEDS(clipping);
-    *clipping = writer->clipping;
-    return VSH_OK;
-}
-
 vsh_result vshi_image_writer_add(vshi_image_writer *writer, int32_t rows, const float *const *planes,
                                  vsh_error *error) {
     VSHI_FLOATS;
@@ -658,6 +652,9 @@ vsh_result vshi_image_writer_finish(vshi_image_writer *writer, vsh_error *error)
         vshi_image_writer_abandon(writer);
         return result;
     }
+    if (writer->plan.clipping != NULL) {
+        *writer->plan.clipping = writer->clipping;
+    }
     VSHI_TRY_DONE(writer->plan.codec->end(writer->file, error));
     result = vshi_output_commit(&writer->output, error);
 done:
@@ -682,9 +679,6 @@ vsh_result vsh_image_write(const char *path, const vsh_image *image, const vsh_i
     if (result != VSH_OK) {
         vshi_image_writer_abandon(writer);
         return result;
-    }
-    if (options != NULL && options->clipping != NULL) {
-        vshi_image_writer_get_clipping(writer, options->clipping, NULL);
     }
     return vshi_image_writer_finish(writer, error);
 }

@@ -13,34 +13,30 @@
 extern "C" {
 #endif
 
-/* Metres in a unit: "m", "cm", "mm", "in" or "ft"; 0 for what is none, and NULL. */
+/* Returns the metres in a unit, "m", "cm", "mm", "in" or "ft"; 0 for another name and NULL. */
 double vshi_find_unit(const char *name);
 
-/* A material of a file, as far as it decides where light comes through. What is of the texture is told
- * of masked and blended ones; light comes through masked ones where base_alpha × the texture's alpha <
- * alpha_cutoff. */
+/* The part of a file's material that decides where light passes. Masked and blended materials have a texture;
+ * masked ones let light pass where base_alpha × its alpha is below alpha_cutoff. */
 typedef struct vshi_material {
-    const char *name;       /* NULL where it has none */
+    const char *name;       /* NULL: none */
     int32_t alpha;          /* VSH_ALPHA_… */
-    int32_t double_sided;   /* 1: both sides of its faces are seen */
-    double alpha_cutoff;    /* ≥ 0; 0 where it is not masked */
+    int32_t double_sided;   /* 1: both sides of its faces are visible */
+    double alpha_cutoff;    /* ≥ 0; 0 if it is not masked */
     double base_alpha;      /* 0 … 1 */
-    int32_t uv_set;         /* of the texture, 0 … VSH_MAX_UV_SETS - 1; a mesh need not have it */
+    int32_t uv_set;         /* of the texture, 0 … VSH_MAX_UV_SETS - 1; a mesh may lack it */
     int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
-    double uv_transform[6]; /* rows (a, b, c), (d, e, f): the image is looked up at u' = a u + b v + c,
-                               v' = d u + e v + f, v up in all */
-    const void *image; /* the base colour's image file (PNG, JPEG, …) as it is in the model; NULL where it
-                          is a file of its own, or none */
-    size_t image_size; /* bytes of it */
-    const char *image_path; /* the file, within the model's folder unless run->allow_outside; it need not be
-                               there. NULL: none */
+    double uv_transform[6]; /* as in vsh_alpha_mask */
+    const void *image; /* bytes of the base colour's image file (PNG, JPEG, …) in the model; NULL: none */
+    size_t image_size;
+    const char *image_path; /* a file instead, in the model's folder unless run->allow_outside; it may be
+                               missing. NULL: none */
     int32_t image_channel;  /* VSH_MASK_CHANNEL_… */
-    int32_t by_texture; /* 1: the format has no mode of alpha (OBJ): it is blended by base_alpha and the image
-                           alone, and as good as opaque where neither leaves anything out */
+    int32_t by_texture;     /* 1: the format has no alpha mode (OBJ). base_alpha and the image blend it; it is
+                               opaque if neither leaves anything out */
 } vshi_material;
 
-/* Number of materials of the file: of PLY 0. Of formats other than glTF and OBJ name and
- * `alpha` are told. */
+/* Number of materials: 0 for PLY. Formats other than glTF and OBJ give names and `alpha` alone. */
 size_t vshi_model_material_count(const vsh_model *model);
 
 /* Material `index` (< material count). What it points to belongs to the model. */

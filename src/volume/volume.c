@@ -233,8 +233,8 @@ static void find_normals(const volume_bake *bake, piece *p) {
     p->count = kept;
 }
 
-/* Numbers voxels for samplers, by two coordinates. The third goes into both, by steps that no plane of voxels
- * repeats soon. */
+/* Numbers voxels for samplers by two coordinates. The third is added to both in steps, so that no plane of
+ * voxels soon repeats another. */
 static void number_voxels(const volume_bake *bake, piece *p) {
     static const uint32_t COLUMN_STEP = 47, ROW_STEP = 29;
     const int32_t *origin = bake->blocks[p->block].origin;

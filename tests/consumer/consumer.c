@@ -1,5 +1,5 @@
-/* What a user of the C library does, against the installed package: a level set to a file and back by the
- * installed reader, shades points, and writes an image by the installed module. The programs of examples/
+/* Uses the installed C library as a program would: writes a level set, reads it back by the installed reader,
+ * shades points, and writes an image by the installed module. The programs of examples/
  * bake lightmaps and meshes. Ends with 0 if every value is right. Usage: consumer FOLDER (for the files it
  * writes). */
 #include <vdbshade/vdbshade.h>

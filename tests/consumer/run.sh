@@ -41,6 +41,17 @@ for header in "$prefix"/include/vdbshade/*.h; do
     "$cxx" -std=c++11 -pedantic -Wall -Wextra -Werror -fsyntax-only -I"$prefix/include" -x c++ "$work/alone.c"
 done
 
+say "the examples on top of the headers"
+for header in "$prefix"/include/vdbshade/*.h; do
+    [ "$(basename "$header")" != vdbshade.h ] || continue # examples/lightmap.c
+    printf '#include "examples.h"\nvoid example(void) {\n' >"$work/example.c"
+    sed -n '/\*\//q; s/^ \*     //p' "$header" >>"$work/example.c"
+    printf '}\n' >>"$work/example.c"
+    [ "$(wc -l <"$work/example.c")" -gt 5 ] || { echo "$header: no example" && exit 1; }
+    "$cc" -std=c11 -pedantic -Wall -Wextra -Werror -Wno-unused-variable -Wno-unused-but-set-variable -fsyntax-only -I"$here" \
+        -I"$prefix/include" "$work/example.c"
+done
+
 say "CMake: find_package(vdbshade)"
 cmake -S "$here" -B "$work/cmake" -DCMAKE_PREFIX_PATH="$prefix" -DCMAKE_BUILD_TYPE=Release >"$work/cmake.log" ||
     { cat "$work/cmake.log"; exit 1; }

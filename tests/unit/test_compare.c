@@ -666,8 +666,8 @@ static uint32_t judge_noisy(const plane *golden, const plane *values, double all
     return vshi_compare_judge(m, &limits);
 }
 
-/* What fails if the picture is the usual one, the other was estimated with noise, and limits allow for some
- * of it. */
+/* The measures that fail between the usual picture and a noisy estimate of another one. Limits allow for a
+ * part of the noise. */
 static uint32_t failures(picture other, double made, double allowed) {
     FREED_BY(free_plane) plane golden = draw(usual), values = draw(other);
     for (uint32_t i = 0; i < TEXELS; ++i) {
