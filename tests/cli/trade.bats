@@ -73,7 +73,7 @@ rmse() {
     adaptive=$(rmse '--method adaptive --max-error 0.005 --resolution 24')
     holds "$exact < 0.005"
     holds "$exact < $adaptive + 0.001"
-    grep -q 'off by about 0.0004 for shadow and 0.0023 for AO' trade.html || fail "no word of the truth's own error"
+    grep -q 'differs by 0.0004 for shadow and 0.0023 for AO' trade.html || fail "no word of the truth's own error"
 }
 
 @test "procedural casters, and shapes beside meshes: the truth is rays against both themselves" {
