@@ -1,6 +1,5 @@
 /* Helpers of the benchmarks in this folder. */
-#ifndef BENCH_COMMON_H
-#define BENCH_COMMON_H
+#pragma once
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,5 +22,3 @@ static inline void bench_check(vsh_result result, const vsh_error *error) {
         exit(2);
     }
 }
-
-#endif

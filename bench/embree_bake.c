@@ -6,15 +6,15 @@
  * It loads, rasterises, judges validity, pads and writes as `vdbshade bake` does, by the same code; between
  * that it traces N rays a texel (16) of the same sampler in Embree's packets. No level set, no field, no
  * proofs, nothing that texels share. Truth is that of many rays of another frame. */
-#include "bake/origins.h"
-#include "bake/page.h"
-#include "bake_scene/bake_scene.h"
 #include "base/clock.h"
 #include "base/parallel.h"
 #include "common.h"
 #include "embree_rays.h"
 #include "field/field.h"
+#include "lightmap/origins.h"
+#include "lightmap/page.h"
 #include "scene/assets.h"
+#include "scene/bake_scene.h"
 #include "trace/embree_scene.h"
 
 #include <getopt.h>

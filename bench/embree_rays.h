@@ -1,6 +1,5 @@
 /* What plain rays make of texels: as many for each, in Embree's packets, and nothing else. */
-#ifndef BENCH_EMBREE_RAYS_H
-#define BENCH_EMBREE_RAYS_H
+#pragma once
 
 #include "light/light.h"
 #include "trace/embree.h"
@@ -26,5 +25,3 @@ uint32_t (*bench_rays_net(const vshi_sampler *sampler, int32_t rays))[2];
 void bench_rays_trace(const bench_rays_task *task, const uint32_t (*net)[2], size_t count,
                       const double *origins, const float *normals, const float *faces, const uint32_t *texels,
                       float *values);
-
-#endif

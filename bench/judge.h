@@ -1,7 +1,6 @@
 /* What tools/judge-assets asks: the truth of a model's lightmap, and what a bake is off by. Reading models
  * and images is the library's, all else is of its own: texels, solids, rays. */
-#ifndef JUDGE_H
-#define JUDGE_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -101,5 +100,3 @@ _Noreturn void judge_give_up(const char *what, const char *why);
 
 /* Bytes, or the end of the program. */
 void *judge_take(size_t bytes);
-
-#endif

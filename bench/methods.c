@@ -4,9 +4,9 @@
  *
  *   vsh_methods FILE.csv */
 #include "analytic.h"
-#include "bake/texels.h"
 #include "common.h"
 #include "field/field.h"
+#include "lightmap/texels.h"
 #include "metrics.h"
 #include "packets.h"
 #include "scene/assets.h"
@@ -241,7 +241,7 @@ typedef struct receiver {
 } receiver;
 
 /* A bake's rays begin a voxel above the surface where it is nearer than CREASE to another surface there, and
- * a sample is not shaded at all where it is nearer than CLEAR (src/bake/origins.c); voxels. */
+ * a sample is not shaded at all where it is nearer than CLEAR (src/lightmap/origins.c); voxels. */
 static const double CREASE = 0.75, CLEAR = 0.25;
 
 /* Every STRIDE-th sample in both directions of the tiles, so that the truth takes a minute and not an hour.

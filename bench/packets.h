@@ -1,8 +1,7 @@
 /* Embree as a yardstick: rays as those of truth_mesh_light() and truth_mesh_ao(), traced in each way that
  * could be the fastest. The values may differ from truth's by single rays, as packets and lone rays take
  * other code. */
-#ifndef BENCH_PACKETS_H
-#define BENCH_PACKETS_H
+#pragma once
 
 #include "embree.h"
 
@@ -34,5 +33,3 @@ typedef struct truth_question {
  * short. */
 int truth_mesh_packets(const truth_mesh *truth, int packing, const truth_question *question, int threads,
                        float *values);
-
-#endif

@@ -39,7 +39,7 @@ endfunction()
 # which run in vshi_on_stack() (src/base/threads.h).
 set(VSH_LARGEST_FRAME 24576)
 file(GLOB VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/shade/*.c)
-list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/volume/volume.c ${PROJECT_SOURCE_DIR}/src/field/level.c)
+list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/lightmap/volume.c ${PROJECT_SOURCE_DIR}/src/field/level.c)
 set_source_files_properties(${VSH_LARGE_FRAMES} PROPERTIES COMPILE_OPTIONS -Wno-frame-larger-than)
 function(vsh_limit_frames target)
   if(NOT VSH_SANITIZE)

@@ -3,7 +3,7 @@
 # What TBB's headers expand into is built without the thread sanitizer: the scheduler, which is not instrumented, orders
 # what it does on its callers' stacks, and a later use of such a stack would seem to race with it. What the loops call
 # is instrumented.
-set_source_files_properties(${PROJECT_SOURCE_DIR}/src/extern/tbb.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=thread)
+set_source_files_properties(${PROJECT_SOURCE_DIR}/src/base/tbb.cpp PROPERTIES COMPILE_OPTIONS -fno-sanitize=thread)
 
 # There are hundreds of test programs, each of all the objects: lld links one in a tenth of the time.
 include(CheckLinkerFlag)

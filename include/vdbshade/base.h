@@ -41,8 +41,7 @@
  * - VSH_ERROR_MEMORY and VSH_ERROR_INTERNAL can come from every call that returns a vsh_result, and
  *   VSH_ERROR_CANCELLED from every one that takes a run. The docs of each call list the others.
  *   "VSH_ERROR_ARGUMENT: run" means a member of vsh_run out of range. */
-#ifndef VDBSHADE_BASE_H
-#define VDBSHADE_BASE_H
+#pragma once
 
 #include <stddef.h>
 #include <stdint.h>
@@ -56,9 +55,16 @@
 #define VSH_API
 #endif
 
+/* Open and close a block of C declarations for C++ programs. */
 #ifdef __cplusplus
-extern "C" {
+#define VSH_BEGIN_C extern "C" {
+#define VSH_END_C }
+#else
+#define VSH_BEGIN_C
+#define VSH_END_C
 #endif
+
+VSH_BEGIN_C
 
 /* The version of these headers; vsh_version() returns the library's. */
 #define VSH_VERSION_MAJOR 0
@@ -240,7 +246,4 @@ VSH_API int32_t vsh_reader_serve(int argc, char **argv);
  */
 VSH_API vsh_result vsh_reader_confinement(const vsh_run *run, uint32_t *confined, vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -11,16 +11,13 @@
  *     }
  *     vsh_comparison_free(comparison);
  */
-#ifndef VDBSHADE_COMPARE_H
-#define VDBSHADE_COMPARE_H
+#pragma once
 
 #include "image.h"
 
 #include <math.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* --- coverage */
 
@@ -211,7 +208,4 @@ VSH_API const char *vsh_comparison_problem(const vsh_comparison *comparison, siz
 
 VSH_API void vsh_comparison_free(vsh_comparison *comparison); /* NULL does nothing */
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

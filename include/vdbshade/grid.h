@@ -10,14 +10,11 @@
  *     vsh_grid_free(grid);
  *
  * vsh_occluders_from_grid() turns a grid into something that casts. */
-#ifndef VDBSHADE_GRID_H
-#define VDBSHADE_GRID_H
+#pragma once
 
 #include "mesh.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* An OpenVDB level set of floats. Immutable; threads may share it. Free it with vsh_grid_free(). */
 typedef struct vsh_grid vsh_grid;
@@ -202,7 +199,4 @@ typedef struct vsh_vdb_entry {
 VSH_API vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
                                 size_t *count, vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

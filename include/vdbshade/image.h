@@ -9,14 +9,11 @@
  *     vsh_image back = vsh_image_view(file);
  *     vsh_image_free(file);
  */
-#ifndef VDBSHADE_IMAGE_H
-#define VDBSHADE_IMAGE_H
+#pragma once
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
 
@@ -126,7 +123,4 @@ VSH_API vsh_image vsh_image_view(const vsh_image_file *file);
 VSH_API const vsh_attribute *vsh_image_attributes(const vsh_image_file *file, size_t *count);
 VSH_API void vsh_image_free(vsh_image_file *file); /* NULL does nothing */
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -10,14 +10,11 @@
  *     vsh_shade_shadow(occluders, &points, &sun, NULL, &run, &lit, NULL, NULL, &error);
  *
  * vsh_query answers repeated calls for few points faster, and reads points from the caller's own structs. */
-#ifndef VDBSHADE_LIGHT_H
-#define VDBSHADE_LIGHT_H
+#pragma once
 
 #include "occluders.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 enum {
     VSH_LIGHT_DIRECTIONAL = 0, /* direction, angle */
@@ -363,7 +360,4 @@ VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *po
                                     const vsh_point_layout *layout, const vsh_run *run,
                                     const vsh_query_output *output, vsh_shade_stats *stats, vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

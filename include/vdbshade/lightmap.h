@@ -12,16 +12,13 @@
  *     vsh_charts_free(charts);
  *
  * vsh_bake_scene() bakes whole files instead. */
-#ifndef VDBSHADE_LIGHTMAP_H
-#define VDBSHADE_LIGHTMAP_H
+#pragma once
 
 #include "light.h"
 
 #include <math.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 enum { VSH_MAX_PAGES = 1024, VSH_MAX_PAGE_SIZE = 65536 };
 
@@ -397,7 +394,4 @@ VSH_API vsh_result vsh_lightmap_fill_hidden(const vsh_charts *charts, const vsh_
                                             size_t light_count, const vsh_run *run, uint64_t *filled,
                                             vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -10,14 +10,11 @@
  *     vsh_model_read("room.glb", &run, &model, &error);
  *     vsh_mesh room = vsh_model_mesh(model, 0, -1); // a view; free the model last
  */
-#ifndef VDBSHADE_MESH_H
-#define VDBSHADE_MESH_H
+#pragma once
 
 #include "base.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 enum { VSH_MAX_UV_SETS = 8 };
 
@@ -306,7 +303,4 @@ VSH_API vsh_result vsh_outline_from_polygons(const double *points, const size_t 
                                              const vsh_run *run, vsh_outline **outline, vsh_error *error);
 VSH_API void vsh_outline_free(vsh_outline *outline); /* NULL does nothing */
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -11,14 +11,11 @@
  *     vsh_occluders_free(occluders);
  *
  * vsh_scene_occluders() makes them of a scene, with layers, heightfields and spheres. */
-#ifndef VDBSHADE_OCCLUDERS_H
-#define VDBSHADE_OCCLUDERS_H
+#pragma once
 
 #include "grid.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* The triangles and voxels of all casters. Immutable; threads may share it. Free it with
  * vsh_occluders_free(). */
@@ -126,7 +123,4 @@ typedef struct vsh_field_info {
 /* Fills *info. Cannot fail. */
 VSH_API void vsh_field_get_info(const vsh_field *field, vsh_field_info *info);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -7,14 +7,11 @@
  *     vsh_picture picture = {.color = &color[0][0][0]};
  *     vsh_render(&surface, 1, occluders, &sun, 1, &options, &run, &picture, NULL, &error);
  */
-#ifndef VDBSHADE_PICTURE_H
-#define VDBSHADE_PICTURE_H
+#pragma once
 
 #include "scene.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* --- cameras */
 
@@ -307,7 +304,4 @@ typedef struct vsh_flat_map {
 VSH_API vsh_result vsh_flat_bake(const vsh_flat_scene *scene, const vsh_run *run, const vsh_flat_map *map,
                                  vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

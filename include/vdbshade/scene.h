@@ -7,17 +7,14 @@
  *     vsh_scene_free(scene);
  *
  * vsh_assets_load() and vsh_scene_occluders() give the parts of a bake one by one. */
-#ifndef VDBSHADE_SCENE_H
-#define VDBSHADE_SCENE_H
+#pragma once
 
 #include "image.h"
 #include "lightmap.h"
 
 #include <string.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* --- casters */
 
@@ -691,7 +688,4 @@ VSH_API vsh_result vsh_lit_write(const char *path, const vsh_model *model, const
 /* Returns 1 if `path` ends as a file of vsh_lit_write(), else 0; 0 for NULL. */
 VSH_API int32_t vsh_lit_is_output(const char *path);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -30,8 +30,7 @@
  *         return result;
  *     }
  */
-#ifndef VDBSHADE_H
-#define VDBSHADE_H
+#pragma once
 
 #include "base.h"
 #include "compare.h"
@@ -44,5 +43,3 @@
 #include "picture.h"
 #include "scene.h"
 #include "volume.h"
-
-#endif

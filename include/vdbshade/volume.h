@@ -10,14 +10,11 @@
  *     vsh_volume_free(volume);
  *     vsh_voxels_free(voxels);
  */
-#ifndef VDBSHADE_VOLUME_H
-#define VDBSHADE_VOLUME_H
+#pragma once
 
 #include "light.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* --- voxels: where to shade */
 
@@ -156,9 +153,7 @@ VSH_API vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, 
                                     const vsh_attribute *attributes, size_t attribute_count,
                                     vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
+VSH_END_C
 
 /* C++ programs that include OpenVDB's headers before this one also get these functions. */
 #if defined(__cplusplus) && defined(OPENVDB_LIBRARY_VERSION_NUMBER)
@@ -193,5 +188,4 @@ inline vsh_result volume_to_openvdb(const vsh_volume *volume, size_t grid,
 }
 
 } // namespace vdbshade
-#endif
 #endif

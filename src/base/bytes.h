@@ -1,6 +1,5 @@
 /* Bytes: sizes as text, numbers in binary files, hashing. */
-#ifndef VSHI_BYTES_H
-#define VSHI_BYTES_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -64,5 +63,3 @@ static inline double vshi_json_bytes(const char *text, size_t size) {
     }
     return 288.0 * objects + 176.0 * arrays + 144.0 * members + 112.0 * items + 3.0 * (double)size;
 }
-
-#endif

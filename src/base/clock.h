@@ -1,6 +1,5 @@
 /* Seconds on a clock that only goes forward. */
-#ifndef VSHI_CLOCK_H
-#define VSHI_CLOCK_H
+#pragma once
 
 #include <time.h>
 
@@ -9,5 +8,3 @@ static inline double vshi_seconds(void) {
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
-
-#endif

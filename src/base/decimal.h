@@ -1,16 +1,14 @@
 /* Numbers in text, independent of the locale: read exactly, written so that they read back as the same bits.
  */
-#ifndef VSHI_DECIMAL_H
-#define VSHI_DECIMAL_H
+#pragma once
 
 #include <locale.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <vdbshade/base.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 enum { VSHI_DECIMAL_ROOM = 32 }; /* bytes that are enough for any number */
 
@@ -28,9 +26,7 @@ const char *vshi_decimal_float(const char *text, float *value);
 char *vshi_decimal_write_float(char *text, float value);
 char *vshi_decimal_write_double(char *text, double value);
 
-#ifdef __cplusplus
-}
-#endif
+VSH_END_C
 
 /* --- numbers by the C library, independent of the host's locale and rounding */
 
@@ -71,5 +67,3 @@ static inline void vshi_numbers_end(const vshi_numbers *host) {
 /* Put this first in a scope that reads numbers, or writes them to files. It affects this thread only. */
 #define VSHI_NUMBERS                                                                                         \
     const vshi_numbers host_numbers __attribute__((cleanup(vshi_numbers_end), unused)) = vshi_numbers_begin()
-
-#endif

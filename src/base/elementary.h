@@ -3,8 +3,7 @@
  * variants (N. Shibata and F. Petrogalli, "SLEEF: a portable vectorized library of C standard mathematical
  * functions", 2020) are within 1 ulp and take 1 to 2.5 times as long. sqrt(), fmod() and ldexp() are exact
  * everywhere. */
-#ifndef VSHI_ELEMENTARY_H
-#define VSHI_ELEMENTARY_H
+#pragma once
 
 #include <math.h>
 #include <sleef.h>
@@ -48,5 +47,3 @@ static inline double vshi_to_srgb(double linear) {
 static inline double vshi_from_srgb(double encoded) {
     return encoded <= 0.04045 ? encoded / 12.92 : vshi_pow((encoded + 0.055) / 1.055, 2.4);
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Filling the caller's error. */
-#ifndef VSHI_ERROR_H
-#define VSHI_ERROR_H
+#pragma once
 
 #include <vdbshade/base.h>
 
@@ -10,9 +9,7 @@
  * version. */
 #define VSHI_SHARED __attribute__((visibility("default")))
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* The version of the headers that this file is compiled with: "0.2.0". */
 #define VSHI_TEXT_OF(number) #number
@@ -66,7 +63,4 @@ VSHI_SHARED vsh_result vshi_fail_memory(vsh_error *error, const char *what);
 /* Control characters, and bytes that are not UTF-8, become '?'. */
 VSHI_SHARED void vshi_one_line(char *text);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -1,6 +1,5 @@
 /* Files: paths, outputs that appear whole or not at all, inputs of strangers, hashes. */
-#ifndef VSHI_FILE_H
-#define VSHI_FILE_H
+#pragma once
 
 #include "base/job.h"
 
@@ -8,9 +7,7 @@
 #include <stdio.h>
 #include <vdbshade/base.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* A file being written: `temporary` is in the target's folder, exists (empty) from the start and keeps the
  * target's ending, because writers choose a format by it. */
@@ -78,7 +75,4 @@ VSHI_SHARED bool vshi_input_is_beside(const char *model, const char *path);
 /* vsh_file_digest(), within a job. */
 vsh_result vshi_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vshi_job *job, vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -1,17 +1,15 @@
 /* Public calls compute in the default floating-point environment (round to nearest, denormals kept, no traps)
  * and restore the host's. TBB's threads copy it from the thread that makes an arena, so set it before. */
-#ifndef VSHI_FLOATS_H
-#define VSHI_FLOATS_H
+#pragma once
 
 #include <stdint.h>
+#include <vdbshade/base.h>
 
 #if !defined(__x86_64__) && !defined(__aarch64__)
 #include <fenv.h>
 #endif
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 typedef uint64_t vshi_floats;
 
@@ -81,12 +79,8 @@ static inline void vshi_floats_end(const vshi_floats *host) {
     }
 }
 
-#ifdef __cplusplus
-}
-#endif
+VSH_END_C
 
 /* Put this first in a public function: it sets the default environment until the function returns. */
 #define VSHI_FLOATS                                                                                          \
     const vshi_floats host_floats __attribute__((cleanup(vshi_floats_end), unused)) = vshi_floats_begin()
-
-#endif

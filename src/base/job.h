@@ -1,14 +1,11 @@
 /* A stage of work under way: progress, cancelling, warnings, and the options of a run. */
-#ifndef VSHI_JOB_H
-#define VSHI_JOB_H
+#pragma once
 
 #include "base/error.h"
 
 #include <stdbool.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 typedef struct vshi_job vshi_job;
 
@@ -73,7 +70,4 @@ VSHI_SHARED int32_t vshi_isa_resolve(int32_t isa);
 #define VSHI_KERNEL_OF(name, isa) ((void)(isa), &name##_base)
 #endif
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -1,15 +1,12 @@
 /* Sizes computed with overflow checks, allocation behind them, and the memory limit. */
-#ifndef VSHI_MEMORY_H
-#define VSHI_MEMORY_H
+#pragma once
 
 #include "base/error.h"
 
 #include <stdbool.h>
 #include <string.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* Allocates count × size bytes, zeroed and aligned to 64, or NULL if count is 0. Free with free(). Errors:
  * VSH_ERROR_MEMORY, naming `what`. */
@@ -87,7 +84,8 @@ void vshi_store_give(vshi_store *store, void *memory);
 /* Frees all arrays. */
 void vshi_store_close(vshi_store *store);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+/* Makes operator new end the process with this exit code if memory is refused, before a library does worse.
+ */
+void vshi_exit_if_new_fails(int code);
+
+VSH_END_C

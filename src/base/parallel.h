@@ -1,12 +1,9 @@
 /* Loops over the one thread pool (TBB's). */
-#ifndef VSHI_PARALLEL_H
-#define VSHI_PARALLEL_H
+#pragma once
 
 #include "base/job.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* Handles elements begin … end - 1. May run on any thread; must not depend on how the range was cut. */
 typedef void vshi_range_fn(void *user, size_t begin, size_t end);
@@ -35,7 +32,4 @@ vsh_result vshi_parallel_each(vshi_job *job, size_t count, size_t grain, size_t 
  * Errors: VSH_ERROR_MEMORY, VSH_ERROR_INTERNAL. */
 vsh_result vshi_parallel_call(const vshi_job *job, void (*fn)(void *user), void *user, vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -1,6 +1,5 @@
 /* Texts: UTF-8, known words, lines that files carry, and URIs. */
-#ifndef VSHI_BASE_TEXT_H
-#define VSHI_BASE_TEXT_H
+#pragma once
 
 #include "base/error.h"
 
@@ -8,9 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* --- UTF-8 in texts of others */
 
@@ -80,7 +77,4 @@ static inline void vshi_base64_group(const uint8_t *bytes, size_t count, char le
     }
 }
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

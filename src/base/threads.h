@@ -1,6 +1,5 @@
 /* The threads that the system gives this process, and stacks that are large enough. */
-#ifndef VSHI_THREADS_H
-#define VSHI_THREADS_H
+#pragma once
 
 #include "base/error.h"
 
@@ -9,9 +8,7 @@
 #include <stdint.h>
 #include <vdbshade/base.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* Threads that liblog4cplus begins when OpenVDB is loaded. It ends the process if the system refuses one. */
 enum { VSHI_OPENVDB_THREADS = 4 };
@@ -32,7 +29,4 @@ enum { VSHI_STACK = 4 << 20 /* bytes, as TBB's threads have */, VSHI_STACK_ENOUG
 typedef vsh_result vshi_stack_fn(void *user, vsh_error *error);
 VSHI_SHARED vsh_result vshi_on_stack(vshi_stack_fn *fn, void *user, vsh_error *error);
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -1,15 +1,13 @@
 /* Vectors of three doubles, and transforms of three rows of four. A similarity rotates, moves, mirrors and
  * scales evenly. */
-#ifndef VSHI_VEC_H
-#define VSHI_VEC_H
+#pragma once
 
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <vdbshade/base.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 typedef struct vshi_vec {
     double x, y, z;
@@ -183,7 +181,4 @@ typedef struct vshi_segment_ray {
     double far; /* may be infinite */
 } vshi_segment_ray;
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

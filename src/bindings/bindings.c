@@ -2,11 +2,11 @@
  * progress for languages with slow callbacks. And the reader's parsers for each kind of file. */
 #include "bindings/bindings.h"
 #include "base/clock.h"
-#include "image/image.h"
+#include "io/image/image.h"
+#include "io/lit/work.h"
+#include "io/model/model.h"
 #include "levelset/access.h"
-#include "lit/work.h"
-#include "model/model.h"
-#include "outline/outline.h"
+#include "shapes/outline.h"
 
 #include <vdbshade/vdbshade.h>
 

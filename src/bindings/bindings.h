@@ -1,5 +1,4 @@
-#ifndef VSHI_BINDINGS_H
-#define VSHI_BINDINGS_H
+#pragma once
 
 #include "base/error.h"
 
@@ -31,5 +30,3 @@ static inline vshi_progress_filter vshi_progress_filter_default(void) {
 
 /* A vsh_progress_fn: `filter` points to a vshi_progress_filter. */
 VSHI_SHARED int32_t vshi_progress_seldom(void *filter, const char *stage, double fraction);
-
-#endif

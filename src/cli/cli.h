@@ -1,8 +1,7 @@
 /* Declarations that the commands of `vdbshade` share.
  *
  * A function that returns an exit code prints an error before it returns another one than CLI_OK. */
-#ifndef CLI_H
-#define CLI_H
+#pragma once
 
 #include "base/file.h"
 
@@ -456,5 +455,3 @@ typedef struct cli_provenance {
 int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
                         const vsh_occluders_info *casters, cli_provenance *origin);
 void cli_provenance_free(cli_provenance *origin);
-
-#endif

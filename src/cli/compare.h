@@ -1,6 +1,5 @@
 /* Two baked files, compared and reported: shared by `compare` and `regress`. */
-#ifndef CLI_COMPARE_H
-#define CLI_COMPARE_H
+#pragma once
 
 #include "cli.h"
 
@@ -81,5 +80,3 @@ json_t *cli_comparison_json(const cli_comparison *comparison);
 /* Writes the JUnit and HTML reports of the settings. */
 int cli_comparison_report(const cli_compare_settings *settings, const cli_comparison *comparisons,
                           size_t count);
-
-#endif

@@ -1,6 +1,5 @@
 /* Golden and new values on one lattice, and the measures taken of them. */
-#ifndef VSHI_COMPARE_H
-#define VSHI_COMPARE_H
+#pragma once
 
 #include <vdbshade/compare.h>
 
@@ -98,5 +97,3 @@ vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_mea
 
 /* Adds up golden's penumbra widths and the new values' deviation from them, for vsh_accuracy.width_error. */
 void vshi_add_widths(const vshi_pair *pair, double *golden, double *off);
-
-#endif

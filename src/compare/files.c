@@ -5,9 +5,9 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "compare/compare.h"
+#include "io/json.h"
 #include "levelset/access.h"
 #include "scene/scene.h"
-#include "json/json.h"
 
 #include <math.h>
 #include <stdarg.h>

@@ -2,7 +2,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 #include "trace/embree.h"
 
 #include <math.h>

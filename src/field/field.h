@@ -7,8 +7,7 @@
  *
  * Values are 16-bit multiples of a level's quantum, a power of two: 2^-13 voxel for a band of 3 voxels, 2^-12
  * for 6. Only rounding is lost, and a cell interpolates to the same bits as its floats would. */
-#ifndef VSHI_FIELD_H
-#define VSHI_FIELD_H
+#pragma once
 
 #include "base/job.h"
 #include "base/vec.h"
@@ -306,5 +305,3 @@ void vshi_surface_mesh_free(vshi_surface_mesh *mesh);
 /* Whether a place of field space is certainly outside of field->surface: farther from it than a quad may
  * deviate from its cell's values. */
 bool vshi_surface_clears(const vsh_field *field, vshi_vec place);
-
-#endif

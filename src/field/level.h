@@ -1,6 +1,5 @@
 /* Making the levels of a field. */
-#ifndef VSHI_FIELD_LEVEL_H
-#define VSHI_FIELD_LEVEL_H
+#pragma once
 
 #include "field/field.h"
 
@@ -56,5 +55,3 @@ vsh_result vshi_level_derive(vsh_field *field, vshi_below *below, vshi_field_bud
                              vsh_error *error);
 
 void vshi_below_free(vshi_below *below);
-
-#endif

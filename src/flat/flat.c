@@ -8,13 +8,13 @@
  * exact. */
 #include "flat/flat.h"
 
-#include "bake/padding.h"
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "light/light.h"
-#include "outline/outline.h"
+#include "lightmap/padding.h"
+#include "shapes/outline.h"
 
 #include <vdbshade/picture.h>
 

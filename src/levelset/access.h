@@ -1,15 +1,12 @@
 /* Access to level sets and volumes for other rooms. */
-#ifndef VSHI_LEVELSET_ACCESS_H
-#define VSHI_LEVELSET_ACCESS_H
+#pragma once
 
-#include "sandbox/reader.h"
+#include "io/reader/reader.h"
 
 #include <vdbshade/grid.h>
 #include <vdbshade/volume.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* Samples a grid at world positions [count][3] into values[count]: interpolates between the eight voxels
  * around each, as renderers do. Without voxels there the value is the background. It is NaN for positions
@@ -112,7 +109,4 @@ vsh_result vshi_volume_close(vsh_volume *volume, const vsh_volume_info *counts, 
 
 vshi_serve_fn vshi_serve_grid, vshi_serve_list, vshi_serve_voxels, vshi_serve_copy;
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

@@ -1,8 +1,8 @@
 /* Loads OpenVDB when the first level set is made or read. Loading it takes ten times as long as all other
  * libraries together (30 ms, 20 MB). One of its libraries, liblog4cplus, starts threads in the process. */
 #include "levelset/calls.h"
+#include "base/module.h"
 #include "base/threads.h"
-#include "extern/module.h"
 
 static vshi_module module = VSHI_MODULE("level sets", "openvdb", 48 << 20, VSHI_OPENVDB_THREADS);
 

@@ -6,17 +6,14 @@
  * `vsh_error *error`. If loading fails and `none` is not NULL, *none becomes 0. GIVE(result, name,
  * parameters, arguments) needs a handle that a MAKE made. DO(name, parameters, arguments) returns nothing,
  * and does nothing before the module is loaded. */
-#ifndef VSHI_LEVELSET_CALLS_H
-#define VSHI_LEVELSET_CALLS_H
+#pragma once
 
 #include "levelset/access.h"
 
 #include <vdbshade/grid.h>
 #include <vdbshade/volume.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 #define VSHI_SERVE_CALL(MAKE, name)                                                                          \
     MAKE(name,                                                                                               \
@@ -151,7 +148,4 @@ typedef struct vshi_openvdb_table {
 /* The module's one symbol. */
 extern const vshi_openvdb_table vshi_openvdb_module;
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

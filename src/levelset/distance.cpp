@@ -4,8 +4,8 @@
 // |d| - L · (half the box's diagonal) anywhere in it. So boxes of voxels are halved only where the surface or
 // its band may be, from the whole bounds down to leaves of 8³, and the work follows the surface's area.
 #include "base/floats.h"
+#include "geometry/sdf.h"
 #include "levelset/surface.h"
-#include "sdf/sdf.h"
 
 #include <array>
 #include <cmath>

@@ -2,10 +2,10 @@
 // grid, and a stage of work.
 #pragma once
 
+#include "base/guard.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "extern/guard.h"
-#include "extern/tbb.h"
+#include "base/tbb.h"
 #include "levelset/access.h"
 
 #include <algorithm>

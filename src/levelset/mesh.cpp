@@ -1,10 +1,10 @@
 // Level sets from meshes: solids together, rooms cut out of them, walls behind other faces, sheets as shells.
 // Filling a solid fills its rooms. Each room is cut out of the solids around it and of no others, so that
 // pillars and furniture in the room stay.
+#include "geometry/alpha_mask.h"
+#include "geometry/mesh_set.h"
+#include "geometry/solidity.h"
 #include "levelset/surface.h"
-#include "mesh/alpha_mask.h"
-#include "mesh/mesh_set.h"
-#include "mesh/solidity.h"
 
 #include <cfloat>
 #include <cmath>

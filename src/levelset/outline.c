@@ -1,5 +1,5 @@
 /* An extruded outline: its distance in closed form, from the distance to the outline. */
-#include "outline/outline.h"
+#include "shapes/outline.h"
 #include "base/elementary.h"
 #include "base/floats.h"
 #include "base/vec.h"

@@ -1,6 +1,5 @@
 /* Lights: the table of their types, and a light as a point sees it. */
-#ifndef VSHI_LIGHT_H
-#define VSHI_LIGHT_H
+#pragma once
 
 #include "base/elementary.h"
 #include "base/vec.h"
@@ -208,5 +207,3 @@ vsh_result vshi_rectangle_check(const vsh_light *light, vsh_error *error);
 
 /* Moves a rectangle's own members: see vshi_light_moved(). */
 void vshi_rectangle_move(vshi_light_place *place, const double matrix[12], double unit);
-
-#endif

@@ -1,7 +1,7 @@
 /* Meshes with lightmaps on them, rasterised at a picture's samples. */
 #include "base/memory.h"
-#include "image/image.h"
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
+#include "io/image/image.h"
 #include "render/render.h"
 #include "shade/shade.h"
 

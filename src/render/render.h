@@ -1,6 +1,5 @@
 /* The camera's samples, and meshes rasterised at them (lit.c). */
-#ifndef VSHI_RENDER_H
-#define VSHI_RENDER_H
+#pragma once
 
 #include "base/bytes.h"
 #include "base/job.h"
@@ -88,5 +87,3 @@ void vshi_lit_grow_box(const vshi_lit *lit, vshi_vec *low, vshi_vec *high);
 
 /* Light that a triangle with a lightmap sends along a ray, and its unit normal towards the eye. */
 void vshi_lit_shade(const vshi_lit *lit, uint32_t triangle, vshi_vec ray, float color[3], float normal[3]);
-
-#endif

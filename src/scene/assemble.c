@@ -7,10 +7,10 @@
 #include "base/vec.h"
 #include "field/field.h"
 #include "field/level.h"
-#include "outline/outline.h"
-#include "sdf/sdf.h"
+#include "geometry/sdf.h"
 #include "shade/occluders.h"
-#include "spheres/spheres.h"
+#include "shapes/outline.h"
+#include "shapes/spheres.h"
 #include "trace/embree.h"
 
 #include <math.h>

@@ -7,10 +7,10 @@
 #include "base/memory.h"
 #include "base/text.h"
 #include "base/vec.h"
-#include "heightfield/heights.h"
-#include "mesh/mesh.h"
-#include "model/model.h"
-#include "outline/outline.h"
+#include "geometry/mesh.h"
+#include "io/model/model.h"
+#include "shapes/heights.h"
+#include "shapes/outline.h"
 
 #include <math.h>
 #include <stdio.h>

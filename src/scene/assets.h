@@ -1,11 +1,10 @@
 /* The loaded casters and receivers of a scene: meshes, level sets, outlines, spheres; which meshes of a file
  * they take, and lightmap UVs that are made for them. */
-#ifndef VSHI_ASSETS_H
-#define VSHI_ASSETS_H
+#pragma once
 
-#include "heightfield/heights.h"
-#include "mesh/mesh_set.h"
-#include "spheres/spheres.h"
+#include "geometry/mesh_set.h"
+#include "shapes/heights.h"
+#include "shapes/spheres.h"
 #include "trace/trace.h"
 
 #include <stdbool.h>
@@ -222,5 +221,3 @@ bool vshi_scene_keeps_voxels(const vsh_scene *scene, const vsh_scene_layer *laye
 /* vshi_scene_triangles() of one caster alone, for the AO of casters that are shaded without voxels. */
 vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets *assets, size_t caster,
                                        const vsh_run *run, vshi_triangles **triangles, vsh_error *error);
-
-#endif

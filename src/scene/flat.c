@@ -4,8 +4,8 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "outline/outline.h"
 #include "scene/scene.h"
+#include "shapes/outline.h"
 
 #include <math.h>
 #include <stdlib.h>

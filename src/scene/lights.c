@@ -1,7 +1,7 @@
 /* Lights of scene files, in space or in a plane, and of models and their files. */
 #include "base/memory.h"
+#include "io/model/model.h"
 #include "light/light.h"
-#include "model/model.h"
 #include "scene/assets.h"
 #include "scene/scene.h"
 

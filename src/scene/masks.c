@@ -3,10 +3,10 @@
 
 #include "base/job.h"
 #include "base/memory.h"
-#include "image/image.h"
-#include "mesh/alpha_mask.h"
-#include "mesh/mesh.h"
-#include "model/model.h"
+#include "geometry/alpha_mask.h"
+#include "geometry/mesh.h"
+#include "io/image/image.h"
+#include "io/model/model.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -1,7 +1,6 @@
 /* Turns a scene's casters into occluders: chooses methods and voxels, makes fields and triangles. */
 #include "scene/assets.h"
 
-#include "bake/planes.h"
 #include "base/clock.h"
 #include "base/elementary.h"
 #include "base/floats.h"
@@ -9,9 +8,10 @@
 #include "base/memory.h"
 #include "base/vec.h"
 #include "field/field.h"
+#include "geometry/mesh_set.h"
 #include "light/light.h"
-#include "mesh/mesh_set.h"
-#include "method/method.h"
+#include "light/method.h"
+#include "lightmap/planes.h"
 #include "shade/occluders.h"
 
 #include <math.h>

@@ -5,8 +5,8 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/text.h"
-#include "method/method.h"
-#include "model/model.h"
+#include "io/model/model.h"
+#include "light/method.h"
 #include "scene/scene.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
-#include "model/model.h"
+#include "io/model/model.h"
 #include "shade/occluders.h"
 
 #include <math.h>

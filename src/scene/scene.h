@@ -1,8 +1,7 @@
 /* Readers of scene files: each reads one item, or one key's value, into its struct. */
-#ifndef VSHI_SCENE_H
-#define VSHI_SCENE_H
+#pragma once
 
-#include "json/json.h"
+#include "io/json.h"
 
 #include <vdbshade/picture.h>
 
@@ -61,5 +60,3 @@ const char *vshi_color_space_key(int32_t i); /* names of color_space; NULL behin
 /* The union of a flat scene's casters; NULL, with VSH_OK, if it has none. Free it with vsh_outline_free(). */
 vsh_result vshi_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,
                                    vsh_error *error);
-
-#endif

@@ -3,8 +3,8 @@
 
 #include "base/job.h"
 #include "base/memory.h"
-#include "mesh/mesh.h"
-#include "model/model.h"
+#include "geometry/mesh.h"
+#include "io/model/model.h"
 
 #include <vdbshade/scene.h>
 

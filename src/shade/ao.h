@@ -1,9 +1,8 @@
 /* Ambient occlusion: one task for all methods, the frame of a point, cones, rays, and texels that share rays.
  */
-#ifndef VSHI_AO_H
-#define VSHI_AO_H
+#pragma once
 
-#include "method/method.h"
+#include "light/method.h"
 #include "shade/shade.h"
 #include "shade/window.h"
 
@@ -190,5 +189,3 @@ static inline double vshi_ao_shared_spread(int32_t sampler, int32_t rays) {
 
 /* The largest number of rays of a point, by settled options. */
 int32_t vshi_ao_most_rays(const vsh_shade_options *options);
-
-#endif

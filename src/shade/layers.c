@@ -1,9 +1,9 @@
 #include "shade/layers.h"
 
 #include "base/memory.h"
-#include "heightfield/heights.h"
 #include "light/light.h"
-#include "spheres/spheres.h"
+#include "shapes/heights.h"
+#include "shapes/spheres.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,5 @@
 /* Layers beside the field: prepared for a light or for AO, then combined with the field's values. */
-#ifndef VSHI_LAYERS_H
-#define VSHI_LAYERS_H
+#pragma once
 
 #include "shade/ao.h"
 #include "shade/shadow.h"
@@ -30,5 +29,3 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
                         vsh_shade_stats *stats);
 void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
                     vsh_shade_stats *stats);
-
-#endif

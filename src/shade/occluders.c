@@ -6,7 +6,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "field/field.h"
-#include "mesh/mesh_set.h"
+#include "geometry/mesh_set.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 

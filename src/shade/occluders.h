@@ -1,9 +1,8 @@
 /* Casters as shading sees them, and how many voxels pay for them. */
-#ifndef VSHI_OCCLUDERS_H
-#define VSHI_OCCLUDERS_H
+#pragma once
 
-#include "heightfield/heights.h"
-#include "spheres/spheres.h"
+#include "shapes/heights.h"
+#include "shapes/spheres.h"
 #include "trace/trace.h"
 
 #include <vdbshade/light.h>
@@ -117,5 +116,3 @@ int32_t vshi_resolution_traced(const vshi_resolution_need *need);
 /* Voxels along the longest side of casters known only by voxels, so that these displace shadows, or
  * (`ao_only`) AO, by no more than max_error. */
 int32_t vshi_resolution_marched(double max_error, int32_t ao_only);
-
-#endif

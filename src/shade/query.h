@@ -1,6 +1,5 @@
 /* A query: shadow, AO and distances at points by a prepared handle. */
-#ifndef VSHI_QUERY_H
-#define VSHI_QUERY_H
+#pragma once
 
 #include "shade/ao.h"
 #include "shade/layers.h"
@@ -29,5 +28,3 @@ enum { VSHI_QUERY_BALLS = 64 };
  * VSHI_UNPROVED. */
 void vshi_query_prove(const vsh_query *query, int32_t isa, size_t light, size_t count,
                       const double (*centre)[3], const double *radius, int8_t *proof, vsh_shade_stats *stats);
-
-#endif

@@ -7,7 +7,7 @@
 #include "base/parallel.h"
 #include "field/field.h"
 #include "field/level.h"
-#include "method/method.h"
+#include "light/method.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 

@@ -1,6 +1,5 @@
 /* Options, statistics, origins of rays, chunks of cones and errors of rays, for shadow and AO. */
-#ifndef VSHI_SHADE_H
-#define VSHI_SHADE_H
+#pragma once
 
 #include "base/parallel.h"
 #include "light/light.h"
@@ -210,5 +209,3 @@ double vshi_rays_error(int32_t sampler, int32_t lit, int32_t taken, double lit_a
 /* Factor on errors that use the neighbours' share in place of the point's. Measured on the seeds' floor,
  * where the estimate is then right to a tenth. */
 #define VSHI_BORROWED 1.2
-
-#endif

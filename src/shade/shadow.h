@@ -1,10 +1,9 @@
 /* Shadow of one light at points: the data that one-march methods (shadow.c), rays (shadow_rays.c), proofs
  * (blocks.c) and interpolation (interpolation.c) share. */
-#ifndef VSHI_SHADOW_H
-#define VSHI_SHADOW_H
+#pragma once
 
 #include "light/light.h"
-#include "method/method.h"
+#include "light/method.h"
 #include "shade/shade.h"
 
 /* A light as the points of one field see it, then the kernel and arrays of a call. */
@@ -151,5 +150,3 @@ bool vshi_interpolation_pick(vshi_interpolation *interp, int level);
 /* Interpolates the open points of a square once its anchors are known, if the anchors agree with each other
  * to within their errors, and with the open points' own rays. These points are then known too. */
 void vshi_interpolation_fill(vshi_interpolation *interp, int level);
-
-#endif

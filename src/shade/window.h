@@ -6,8 +6,7 @@
  * confidence intervals (Goldenshluger and Nemirovski, "On spatially adaptive estimation of nonparametric
  * regression", 1997; Katkovnik, "A new method for varying adaptive bandwidth selection", 1999). Sums over
  * windows are integers in summed-area tables (Crow, 1984), so no bit depends on where a table begins. */
-#ifndef VSHI_WINDOW_H
-#define VSHI_WINDOW_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -102,5 +101,3 @@ vshi_window_estimate vshi_windows_estimate(const vshi_windows *windows, int32_t 
 /* The weight of texel (column, row) in a window's estimate of texel (x, y). */
 double vshi_window_weight(const vshi_window_estimate *estimate, int32_t x, int32_t y, int32_t column,
                           int32_t row);
-
-#endif

@@ -5,7 +5,7 @@
 #include "base/job.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "mesh/mesh_set.h"
+#include "geometry/mesh_set.h"
 #include "trace/solids.h"
 
 #include <dlfcn.h>

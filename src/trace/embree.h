@@ -1,6 +1,5 @@
 /* Rays against triangles. */
-#ifndef VSHI_EMBREE_H
-#define VSHI_EMBREE_H
+#pragma once
 
 #include "base/job.h"
 #include "base/vec.h"
@@ -131,5 +130,3 @@ void vshi_triangles_bounds(const vshi_triangles *triangles, double low[3], doubl
 
 /* Distance from surfaces at which rays begin, world units: above the rounding of floats, too small to see. */
 double vshi_triangles_lift(const vshi_triangles *triangles);
-
-#endif

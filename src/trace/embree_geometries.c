@@ -4,7 +4,7 @@
 
 #include "base/floats.h"
 #include "base/memory.h"
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 #include "trace/solids.h"
 
 #include <float.h>

@@ -1,8 +1,7 @@
 /* The Embree scene behind vshi_triangles, for the files that build and trace it. */
-#ifndef VSHI_EMBREE_SCENE_H
-#define VSHI_EMBREE_SCENE_H
+#pragma once
 
-#include "mesh/alpha_mask.h"
+#include "geometry/alpha_mask.h"
 #include "trace/embree.h"
 #include "trace/terrain.h"
 
@@ -165,5 +164,3 @@ void vshi_sieves_free(vshi_triangles *triangles);
 /* Lets rays pass through a mesh's geometry as its sieve allows. Vertices and corners are Embree's buffers. */
 void vshi_sieve_attach(const vshi_triangles *triangles, size_t mesh, RTCGeometry geometry,
                        const float *vertices, const uint32_t *corners);
-
-#endif

@@ -1,6 +1,5 @@
 /* Samplers: points in the unit square and on the disc, for the directions of rays. */
-#ifndef VSHI_SAMPLER_H
-#define VSHI_SAMPLER_H
+#pragma once
 
 #include "base/vec.h"
 
@@ -46,5 +45,3 @@ static inline bool vshi_sampler_is_blocks(int32_t first, int32_t last) {
 
 /* Blue noise of VSH_SAMPLER_BLUE: a number in [0, 1) that differs much between neighbouring texels. */
 double vshi_sampler_mask(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose);
-
-#endif

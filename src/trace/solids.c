@@ -7,7 +7,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/vec.h"
-#include "sdf/sdf.h"
+#include "geometry/sdf.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -1,6 +1,5 @@
 /* Rays and cones against procedural solids. Thread safe. */
-#ifndef VSHI_SOLIDS_H
-#define VSHI_SOLIDS_H
+#pragma once
 
 #include "base/vec.h"
 
@@ -28,5 +27,3 @@ typedef enum vshi_cone_state {
  * the axis between `near` and `far`. */
 vshi_cone_state vshi_solids_cone(const vshi_solids *solids, const double origin[3], const double axis[3],
                                  double tangent, double near, double far);
-
-#endif

@@ -1,10 +1,9 @@
 /* Rays against the top of a terrain, without triangles: heights under a pyramid of their maxima (A. Tevs, I.
  * Ihrke, H.-P. Seidel, "Maximum mipmaps for fast, accurate, and scalable dynamic height field rendering",
  * 2008). */
-#ifndef VSHI_TERRAIN_H
-#define VSHI_TERRAIN_H
+#pragma once
 
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 
 enum { VSHI_TERRAIN_LEVELS = 18, VSHI_TERRAIN_LANES = 16 };
 
@@ -53,5 +52,3 @@ void vshi_terrain_trace(const vshi_relief *relief, vshi_terrain_rays *rays);
 
 /* The surface's normal in the rays' space, of any length, where lane `lane` is at t. */
 vshi_vec vshi_terrain_normal(const vshi_relief *relief, const vshi_terrain_rays *rays, int lane, float t);
-
-#endif

@@ -1,6 +1,5 @@
 /* Values at single points by rays against the casters themselves. */
-#ifndef VSHI_TRACE_H
-#define VSHI_TRACE_H
+#pragma once
 
 #include "light/light.h"
 #include "trace/sampler.h"
@@ -89,5 +88,3 @@ void vshi_truth_settle(int32_t rays, const int32_t free[2], int32_t even, double
  * is no value: no normal, or a position that is not finite. Thread safe. */
 bool vshi_truth_twice(const vshi_truth *truth, const double position[3], const float normal[3],
                       const float *face, uint32_t texel, double expected, double seen[2]);
-
-#endif

@@ -1,11 +1,10 @@
 /* Types and functions that the files of this folder share: a mesh cut along its creases, its charts, and
  * their places in an atlas. */
-#ifndef VSHI_UNWRAP_CHARTS_H
-#define VSHI_UNWRAP_CHARTS_H
+#pragma once
 
 #include "base/job.h"
 #include "base/vec.h"
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 
 #include <stdint.h>
 #include <vdbshade/lightmap.h>
@@ -298,5 +297,3 @@ typedef struct vshi_pages {
  * VSH_ERROR_MEMORY. */
 vsh_result vshi_atlas_make(const vshi_shapes *shapes, vshi_pages *pages, const vshi_pack_item *items,
                            size_t item_count, vsh_atlas **atlas, vsh_error *error);
-
-#endif

@@ -2,7 +2,7 @@
 #include "unwrap/charts.h"
 
 #include "base/memory.h"
-#include "mesh/edges.h"
+#include "geometry/edges.h"
 
 #include <complex.h>
 #include <stdlib.h>

@@ -4,7 +4,7 @@
 #include "unwrap/charts.h"
 
 #include "base/memory.h"
-#include "mesh/edges.h"
+#include "geometry/edges.h"
 #include "unwrap/charts.h"
 
 #include <stdlib.h>

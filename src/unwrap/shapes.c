@@ -4,8 +4,8 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "mesh/edges.h"
-#include "mesh/mesh.h"
+#include "geometry/edges.h"
+#include "geometry/mesh.h"
 
 #include <stdlib.h>
 

@@ -1,6 +1,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 #include "unwrap/charts.h"
 
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* A mesh's own UVs: whether they can serve as charts, how dense and how stretched they are. */
 #include "base/floats.h"
 #include "base/memory.h"
-#include "mesh/edges.h"
+#include "geometry/edges.h"
 #include "unwrap/charts.h"
 
 #include <stdlib.h>

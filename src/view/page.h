@@ -1,6 +1,5 @@
 /* A page that shows a bake in a browser. */
-#ifndef VSHI_VIEW_PAGE_H
-#define VSHI_VIEW_PAGE_H
+#pragma once
 
 #include "base/error.h"
 #include "base/file.h"
@@ -29,5 +28,3 @@ typedef struct vshi_view_surface {
 /* Writes a page of the bakes, or of the surface if that is not NULL. Errors: as vsh_view_write(). */
 vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, size_t count,
                                 const vshi_view_surface *surface, const vsh_run *run, vsh_error *error);
-
-#endif

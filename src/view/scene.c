@@ -2,7 +2,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "field/field.h"
-#include "model/model.h"
+#include "io/model/model.h"
 #include "shade/occluders.h"
 #include "view/page.h"
 

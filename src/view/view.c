@@ -8,8 +8,8 @@
 #include "base/job.h"
 #include "base/text.h"
 #include "base/threads.h"
-#include "image/image.h"
-#include "lit/work.h"
+#include "io/image/image.h"
+#include "io/lit/work.h"
 
 #include <Imath/half.h>
 #include <jansson.h>

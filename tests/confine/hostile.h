@@ -1,7 +1,6 @@
 /* What hostile code in a reader tries; tests only, and harmless where it succeeds: it touches marker files of
  * the test's folder, and sends SIGUSR1 to a process of the test's own. */
-#ifndef TESTS_HOSTILE_H
-#define TESTS_HOSTILE_H
+#pragma once
 
 #include <stddef.h>
 
@@ -20,5 +19,3 @@ int hostile_calls(const hostile_aim *aim, char *done, size_t room);
 /* Tries to read the parent, its memory and environment, and other files than the reader needs. As
  * hostile_calls(). */
 int hostile_reads(const hostile_aim *aim, char *done, size_t room);
-
-#endif

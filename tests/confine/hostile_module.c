@@ -5,7 +5,7 @@
 #define _GNU_SOURCE
 #include "hostile.h"
 
-#include "sandbox/reader.h"
+#include "io/reader/reader.h"
 
 #include <vdbshade/base.h>
 

@@ -1,6 +1,5 @@
 /* Small runs through the public calls, and calls of the system that fail in the middle of them. */
-#ifndef FAULTS_SCENARIOS_H
-#define FAULTS_SCENARIOS_H
+#pragma once
 
 #include "../unit/testing.h"
 
@@ -80,5 +79,3 @@ void writes_begin(uint64_t n, int how);
 
 /* The number of calls since; *what names the one that failed, NULL: none did. */
 uint64_t writes_end(const char **what);
-
-#endif

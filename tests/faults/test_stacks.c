@@ -1,7 +1,7 @@
 /* Every kind of call works on a stack of 128 KiB, of a thread and of a fibre. The system does not know a
  * fibre's stack. Nobody may touch the page below each stack. */
 #define _GNU_SOURCE
-#include "sandbox/reader.h"
+#include "io/reader/reader.h"
 #include "scenarios.h"
 
 #include <limits.h>

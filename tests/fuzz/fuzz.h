@@ -1,21 +1,20 @@
 /* Helpers of fuzz targets. A target is one function, LLVMFuzzerTestOneInput(), that gets any bytes and must
  * return. A crash, a sanitizer's report or an abort() is a find. Targets run under libFuzzer (tools/fuzz) or
  * replay files. */
-#ifndef VSH_FUZZ_H
-#define VSH_FUZZ_H
+#pragma once
 
 #include <vdbshade/vdbshade.h>
 
 #ifndef __cplusplus
-#include "bake/texels.h"
 #include "compare/compare.h"
 #include "field/field.h"
 #include "flat/flat.h"
-#include "heightfield/heights.h"
-#include "image/image.h"
-#include "outline/outline.h"
+#include "io/image/image.h"
+#include "lightmap/texels.h"
 #include "shade/occluders.h"
-#include "spheres/spheres.h"
+#include "shapes/heights.h"
+#include "shapes/outline.h"
+#include "shapes/spheres.h"
 #include "trace/trace.h"
 #endif
 
@@ -70,5 +69,3 @@ void fuzz_require(int holds, const char *condition);
         FUZZ_MAKE(name, call);                                                                               \
         type##_free(name);                                                                                   \
     } while (0)
-
-#endif

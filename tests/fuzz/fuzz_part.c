@@ -3,7 +3,7 @@
  * the part, the second how to use the others. */
 #include "fuzz.h"
 
-#include "bake_scene/bake_scene.h"
+#include "scene/bake_scene.h"
 
 #include <stdio.h>
 #include <stdlib.h>

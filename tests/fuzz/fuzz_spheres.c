@@ -1,7 +1,7 @@
 /* Files of spheres, and what is made of them. */
 #include "fuzz.h"
 
-#include "spheres/spheres.h"
+#include "shapes/spheres.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     const char *path = fuzz_file("a.csv", data, size);

@@ -1,8 +1,7 @@
 /* Helpers of the targets for the C API: handles for calls, and structs of any bytes. Callers promise that
  * pointers are right, so each is NULL or an array as long as the struct says.
  */
-#ifndef VSH_FUZZ_PARTS_H
-#define VSH_FUZZ_PARTS_H
+#pragma once
 
 #include "fuzz.h"
 
@@ -43,5 +42,3 @@ typedef void fuzz_call(fuzz_input *input);
 
 /* The call that the input's first byte chooses. */
 void fuzz_choose(const uint8_t *data, size_t size, fuzz_call *const *calls, size_t count);
-
-#endif

@@ -1,7 +1,6 @@
 /* Analytic truth: solids in closed form, and what rays against them say about lights and ambient occlusion.
  * Shares no code with the library, so that neither can hide the other's mistakes. */
-#ifndef TRUTH_ANALYTIC_H
-#define TRUTH_ANALYTIC_H
+#pragma once
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -55,5 +54,3 @@ int truth_lights(truth_scene scene, size_t count, const double *points, const do
 /* Cosine-weighted fraction of the hemisphere around the unit `normal` that is free within `distance`. */
 double truth_ao(truth_scene scene, const double point[3], const double normal[3], double distance,
                 size_t rays);
-
-#endif

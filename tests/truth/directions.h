@@ -1,6 +1,5 @@
 /* Directions towards a disc light and over a hemisphere, the same for analytic and mesh truth. */
-#ifndef TRUTH_DIRECTIONS_H
-#define TRUTH_DIRECTIONS_H
+#pragma once
 
 #include <stddef.h>
 
@@ -23,5 +22,3 @@ void truth_cosine_direction(const truth_frame *frame, size_t index, size_t count
 
 /* Visible share of a disc that a straight edge covers, the edge at x (-1 … 1, in radii) from its centre. */
 double truth_disc_share(double x);
-
-#endif

@@ -1,6 +1,5 @@
 /* Ray-traced truth on triangles: Embree 3, against vsh_mesh views. Shares no code with the library. */
-#ifndef TRUTH_EMBREE_H
-#define TRUTH_EMBREE_H
+#pragma once
 
 #include <stddef.h>
 #include <vdbshade/mesh.h>
@@ -29,5 +28,3 @@ int truth_mesh_ao(const truth_mesh *truth, size_t count, const double *origins, 
  * solids, 0 outside of closed, well-wound meshes. */
 int truth_mesh_backs(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                      size_t rays, int threads, float *backs);
-
-#endif

@@ -1,6 +1,5 @@
 /* An Embree scene of triangles for embree.c and the benchmarks. */
-#ifndef TRUTH_EMBREE_SCENE_H
-#define TRUTH_EMBREE_SCENE_H
+#pragma once
 
 #include "embree.h"
 
@@ -18,5 +17,3 @@ enum { TRUTH_AT_ONCE = 256 };
  * cores). 0, or -1 where not all could be started; the work is done all the same. */
 int truth_in_pieces(size_t count, int threads, void (*body)(void *user, size_t begin, size_t end),
                     void *user);
-
-#endif

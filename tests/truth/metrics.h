@@ -1,6 +1,5 @@
 /* Differences of values from the truth. RMSE alone hides lost penumbrae, so there are other measures. */
-#ifndef TRUTH_METRICS_H
-#define TRUTH_METRICS_H
+#pragma once
 
 #include <stddef.h>
 
@@ -21,5 +20,3 @@ truth_metrics truth_compare(size_t count, const float *values, const float *trut
 
 /* One line: "n … rmse … penumbra … bias … p95 … p99 … max …", under `what`, on standard output. */
 void truth_metrics_print(const char *what, const truth_metrics *metrics);
-
-#endif

@@ -1,11 +1,10 @@
 /* Assets that tests write themselves, and what stands in those that come back. */
-#ifndef TESTS_ASSETS_H
-#define TESTS_ASSETS_H
+#pragma once
 
 #include "models.h"
 
 #include "base/text.h"
-#include "model/model.h"
+#include "io/model/model.h"
 
 #include <jansson.h>
 #include <sys/stat.h>
@@ -369,5 +368,3 @@ static inline asset light_model(const char *path, const vsh_model *model, const 
     remove_file("out.glb");
     return out;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Occluders made of a test's own parts. They live as long as the block around them. */
-#ifndef TESTS_CASTS_H
-#define TESTS_CASTS_H
+#pragma once
 
 #include "shade/occluders.h"
 
@@ -8,5 +7,3 @@
 #define occluders_traced(casters, meshes) (&(const vsh_occluders){.field = (casters), .triangles = (meshes)})
 #define occluders_with(casters, beside, count)                                                               \
     (&(const vsh_occluders){.field = (casters), .layers = (beside), .layer_count = (count)})
-
-#endif

@@ -1,6 +1,5 @@
 /* Fields of analytic scenes, for the tests of the field and the shading. */
-#ifndef TESTS_FIELDS_H
-#define TESTS_FIELDS_H
+#pragma once
 
 #include "handles.h"
 #include "truth/analytic.h"
@@ -64,5 +63,3 @@ static inline uint32_t bits_of(float value) {
     memcpy(&bits, &value, sizeof bits);
     return bits;
 }
-
-#endif

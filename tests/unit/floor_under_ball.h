@@ -1,6 +1,5 @@
 /* A floor under a ball, in files of this run's folder. */
-#ifndef TEST_FLOOR_UNDER_BALL_H
-#define TEST_FLOOR_UNDER_BALL_H
+#pragma once
 
 #include "images.h"
 
@@ -49,5 +48,3 @@ static inline void fill(case_scene *c, int32_t size, double height) {
     c->scene.shade.ao_method = VSH_AO_CONES;
     c->scene.shade.ao_distance = 1.0;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* A folder of the test's own, and its files. VSH_KEEP=1 keeps it. */
-#ifndef TESTS_FOLDER_H
-#define TESTS_FOLDER_H
+#pragma once
 
 #include "testing.h"
 
@@ -68,5 +67,3 @@ static inline void write_all(const char *path, const void *bytes, size_t size) {
 static inline void write_string(const char *path, const char *text) {
     write_all(path, text, strlen(text));
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* A glTF that a test makes: its buffer, views and accessors. */
-#ifndef TESTS_GLTF_MAKER_H
-#define TESTS_GLTF_MAKER_H
+#pragma once
 
 #include "models.h"
 
@@ -65,5 +64,3 @@ static inline vsh_model *read_made(maker *m, const char *rest) {
     free(m);
     return model;
 }
-
-#endif

@@ -1,7 +1,6 @@
 // .vdb files for tests, written with OpenVDB what the library never would. Not with cmocka's C headers
 // before.
-#ifndef TESTS_GRID_FILES_H
-#define TESTS_GRID_FILES_H
+#pragma once
 
 #include <cerrno>
 #include <cmath>
@@ -98,5 +97,3 @@ inline bool make_folder() {
     openvdb::initialize();
     return make_folder(nullptr) == 0;
 }
-
-#endif

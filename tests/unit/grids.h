@@ -1,6 +1,5 @@
 /* The values of grids, and closed forms that they are compared with. */
-#ifndef TESTS_GRIDS_H
-#define TESTS_GRIDS_H
+#pragma once
 
 #include "handles.h"
 
@@ -164,5 +163,3 @@ static inline double room_with_a_ball(const double p[3]) {
     const double q[3] = {p[0] * 5.0, p[1] * 5.0, p[2] * 5.0};
     return fmin(hollow_truth(p), 0.2 * unit_sphere(q));
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Handles and meshes made in one call, with default options. A test fails if one cannot be made. */
-#ifndef TESTS_HANDLES_H
-#define TESTS_HANDLES_H
+#pragma once
 
 #include "testing.h"
 
@@ -133,5 +132,3 @@ static inline vsh_model *model_from(const char *path) {
     assert_ok(vsh_model_read(path, NULL, &model, &failure));
     return model;
 }
-
-#endif

@@ -1,12 +1,11 @@
 /* Images of known values, for tests that write and read them. */
-#ifndef TESTS_IMAGES_H
-#define TESTS_IMAGES_H
+#pragma once
 
 #include "folder.h"
 #include "handles.h"
 
 #include "base/file.h"
-#include "image/image.h"
+#include "io/image/image.h"
 #include "testing.h"
 
 #include <signal.h>
@@ -55,5 +54,3 @@ static inline const float *plane_of(const vsh_image *image, const char *name) {
     fail_msg("no channel '%s'", name);
     return NULL;
 }
-
-#endif

@@ -1,10 +1,9 @@
 /* Kinds of a mesh's components: solids, rooms, walls and sheets. */
-#ifndef KINDS_H
-#define KINDS_H
+#pragma once
 
 #include "shapes.h"
 
-#include "mesh/solidity.h"
+#include "geometry/solidity.h"
 
 OWNER(vshi_solidity)
 
@@ -38,5 +37,3 @@ static inline void assert_sides(const vshi_solidity *s, size_t mesh, const vsh_m
         assert_that(sides[i] == side, "%s: triangle %zu: side %d, expected %d", of->name, i, sides[i], side);
     }
 }
-
-#endif

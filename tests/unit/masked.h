@@ -1,6 +1,5 @@
 /* Cards that a texture cuts out, and what they are without one. */
-#ifndef TESTS_MASKED_H
-#define TESTS_MASKED_H
+#pragma once
 
 #include "testing.h"
 
@@ -144,5 +143,3 @@ static inline vsh_alpha_mask random_mask(uint8_t alpha[WIDE * HIGH], int i, uint
     }
     return mask;
 }
-
-#endif

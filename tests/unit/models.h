@@ -1,10 +1,9 @@
 /* Small model files of every format, for their tests. */
-#ifndef TESTS_MODELS_H
-#define TESTS_MODELS_H
+#pragma once
 
 #include "testing.h"
 
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 
 /* Assimp 5.2 loses what its FBX and glTF readers had taken when a file is cut: its leaks, by name. */
 const char *__lsan_default_suppressions(void);
@@ -260,5 +259,3 @@ static inline size_t binary_ply(unsigned char *bytes, bool big_endian) {
     }
     return (size_t)size;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Outlines for their tests, and rays against their segments one by one. */
-#ifndef TESTS_OUTLINES_H
-#define TESTS_OUTLINES_H
+#pragma once
 
 #include "testing.h"
 
@@ -138,5 +137,3 @@ static inline vsh_light flat_sun(double x, double y, double angle) {
     light.angle = angle;
     return light;
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Options of the preview methods, for tests of cones. */
-#ifndef TESTS_PREVIEWS_H
-#define TESTS_PREVIEWS_H
+#pragma once
 
 #include "testing.h"
 
@@ -32,5 +31,3 @@ static inline vsh_render_options preview_render_options(void) {
     options.shade = preview_options();
     return options;
 }
-
-#endif

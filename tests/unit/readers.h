@@ -1,13 +1,13 @@
 // A test is its own reader (vsh_run.reader), which misbehaves on request.
-#ifndef TESTS_READERS_H
-#define TESTS_READERS_H
+#pragma once
 
-#include "image/image.h"
+#include "base/memory.h"
+#include "io/image/image.h"
+#include "io/model/model.h"
+#include "io/reader/confine.h"
+#include "io/reader/reader.h"
 #include "levelset/file.h"
-#include "model/model.h"
-#include "outline/outline.h"
-#include "sandbox/confine.h"
-#include "sandbox/reader.h"
+#include "shapes/outline.h"
 
 #include "grid_files.h"
 
@@ -77,7 +77,7 @@ inline int as_reader(int argc, char **argv) {
         }
     } else if (how == "hungry") {
         vshi_confine_resources(uint64_t(1) << 20, uint64_t(64) << 20, 60.0);
-        vshi_confine_memory();
+        vshi_exit_if_new_fails(VSHI_READER_OUT_OF_MEMORY);
         std::vector<char *> kept;
         for (;;) {
             kept.push_back(new char[size_t(64) << 20]);
@@ -173,5 +173,3 @@ int damage(const std::vector<unsigned char> &whole, int count, Refuses &&refuses
     }
     return refused;
 }
-
-#endif

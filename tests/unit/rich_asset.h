@@ -1,6 +1,5 @@
 /* An asset that has something of everything (tests/unit/test_lit…). */
-#ifndef TESTS_RICH_ASSET_H
-#define TESTS_RICH_ASSET_H
+#pragma once
 
 #include "assets.h"
 
@@ -262,5 +261,3 @@ static inline void end_lighting(lighting *l) {
     remove_file("tile one.png");
     remove_file("in.glb");
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Scenes from text, for their tests. */
-#ifndef TESTS_SCENES_H
-#define TESTS_SCENES_H
+#pragma once
 
 #include "scene/scene.h"
 #include "testing.h"
@@ -23,5 +22,3 @@ static inline char *read_text(const char *path, size_t *size) {
 }
 
 static const char seeds_path[] = VSH_ASSETS "/seeds.json";
-
-#endif

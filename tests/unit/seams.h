@@ -1,6 +1,5 @@
 /* Surfaces of a few charts, and lightmaps of them that hold what a test says, for the tests of seams. */
-#ifndef TESTS_SEAMS_H
-#define TESTS_SEAMS_H
+#pragma once
 #include "testing.h"
 
 enum { SIDE = 64, TEXELS = SIDE * SIDE, MOST_VERTICES = 1024 };
@@ -150,5 +149,3 @@ static inline bool is_first(size_t texel) {
     const double x = (double)(texel % SIDE) + 0.5 - SECOND[0], y = (double)(texel / SIDE) + 0.5 - SECOND[1];
     return x * x + y * y > 21.2 * 21.2;
 }
-
-#endif

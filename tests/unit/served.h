@@ -1,13 +1,12 @@
 /* Models as a reader's process tells them, for tests that are their own reader (vsh_run.reader), and tellings
  * in which a word is wrong. */
-#ifndef TESTS_SERVED_H
-#define TESTS_SERVED_H
+#pragma once
 
 #include "testing.h"
 
 #include "models.h"
 
-#include "model/model.h"
+#include "io/model/model.h"
 
 #include <sys/mman.h>
 
@@ -91,5 +90,3 @@ static inline void tell_wrong(const char *name, const uint64_t *values, size_t v
     assert_in_range(refused_count, refused_least, 100000);
     assert_in_range(sound_count, sound_least, 100000);
 }
-
-#endif

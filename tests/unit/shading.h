@@ -1,6 +1,5 @@
 /* Short ways to ask for shadows and AO, for their tests. */
-#ifndef TESTS_SHADING_H
-#define TESTS_SHADING_H
+#pragma once
 
 #include "casts.h"
 #include "fields.h"
@@ -113,5 +112,3 @@ static inline vsh_field *hollow_box(double voxel, double wall) {
     nodes[2].right = 1;
     return field_of_grid(grid_of_tree(nodes, 3, with_voxel(voxel)), 0.0);
 }
-
-#endif

@@ -1,6 +1,5 @@
 /* Meshes put together from parts, for tests of solids. */
-#ifndef SHAPES_H
-#define SHAPES_H
+#pragma once
 
 #include "testing.h"
 
@@ -114,5 +113,3 @@ static inline void shape_ball(shape *s, const double centre[3], double radius, d
     }
     shape_turned(s, centre, (const double(*)[2])rings, count, around);
 }
-
-#endif

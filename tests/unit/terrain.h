@@ -1,9 +1,8 @@
 /* Terrains for tests: rolling hills with terraces whose risers are steep, and a few towers one sample wide.
  */
-#ifndef TESTS_TERRAIN_H
-#define TESTS_TERRAIN_H
+#pragma once
 
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 #include "shading.h"
 #include "testing.h"
 #include "truth/embree.h"
@@ -67,5 +66,3 @@ static inline void stand_on(const vsh_mesh *mesh, size_t face, double b, double 
     memcpy(positions + 3 * number, (const double[]){q.x, q.y, q.z}, sizeof(double[3]));
     memcpy(normals + 3 * number, (const float[]){(float)n.x, (float)n.y, (float)n.z}, sizeof(float[3]));
 }
-
-#endif

@@ -2,7 +2,7 @@
  * made of. */
 #include "masked.h"
 
-#include "mesh/alpha_mask.h"
+#include "geometry/alpha_mask.h"
 #include "trace/embree.h"
 #include "truth/metrics.h"
 

@@ -1,7 +1,7 @@
 /* How a reader is confined, and files that are read without one. This program is its own reader, in which
  * libraries have begun threads before its main. */
 #include "folder.h"
-#include "sandbox/confine.h"
+#include "io/reader/confine.h"
 
 TEST(a_reader_that_has_threads_is_confined_wholly) {
     if (VSHI_SANITIZED) {

@@ -1,7 +1,7 @@
 /* Level sets of meshes, against closed forms: solids, open meshes, meshes that nobody should make, and the
  * band voxel by voxel. */
+#include "geometry/mesh.h"
 #include "grids.h"
-#include "mesh/mesh.h"
 #include "shapes.h"
 
 static const double VOXEL = 0.05;

@@ -8,7 +8,7 @@
 
 #include "base/bytes.h"
 #include "base/floats.h"
-#include "extern/tbb.h"
+#include "base/tbb.h"
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>

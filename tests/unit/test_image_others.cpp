@@ -12,7 +12,7 @@
 
 #include "testing.h"
 
-#include "image/image.h"
+#include "io/image/image.h"
 
 namespace {
 

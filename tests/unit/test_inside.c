@@ -1,7 +1,7 @@
 /* A sample that a ray links to the one before is as that one inside a solid or outside (src/shade/inside.c,
- * src/bake/origins.c). The tests look at each sample by itself. */
-#include "bake/texels.h"
+ * src/lightmap/origins.c). The tests look at each sample by itself. */
 #include "handles.h"
+#include "lightmap/texels.h"
 #include "shade/shade.h"
 #include "testing.h"
 

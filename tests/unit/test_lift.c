@@ -1,8 +1,8 @@
 /* Meshes with smooth normals: where shadow rays begin, and which directions count for AO. The truth is that
  * of the facets. */
-#include "bake/origins.h"
-#include "bake/texels.h"
 #include "casts.h"
+#include "lightmap/origins.h"
+#include "lightmap/texels.h"
 #include "testing.h"
 #include "texels_of.h"
 

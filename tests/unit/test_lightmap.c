@@ -1,8 +1,8 @@
 /* Lightmaps of a wall that stands on a floor, of a coarse smooth sphere and of an open sheet. Padding gives
  * texels outside of charts their nearest neighbour's value. */
-#include "bake/padding.h"
 #include "casts.h"
 #include "fields.h"
+#include "lightmap/padding.h"
 #include "testing.h"
 #include "texels_of.h"
 

@@ -1,5 +1,5 @@
 /* vsh_mesh_check() against solids whose edges, area and bounds are known. */
-#include "mesh/mesh.h"
+#include "geometry/mesh.h"
 #include "testing.h"
 
 #include <time.h>

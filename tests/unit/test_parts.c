@@ -1,6 +1,6 @@
 /* Parts of lightmaps, by the library: merged rows, refused options, and damaged parts. */
-#include "bake_scene/bake_scene.h"
 #include "floor_under_ball.h"
+#include "scene/bake_scene.h"
 #include "testing.h"
 
 enum { SIZE = 80, SHARDS = 2, CHANNELS = 12 };

@@ -1,5 +1,5 @@
 /* Polygons cut into triangles: their area is that of the polygon, and none is flipped. */
-#include "model/faces.h"
+#include "io/model/faces.h"
 #include "testing.h"
 
 enum { MOST = 4096 };

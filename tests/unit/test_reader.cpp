@@ -9,7 +9,7 @@
 #include <malloc.h>
 
 extern "C" {
-#include "lit/work.h"
+#include "io/lit/work.h"
 }
 
 // Last: it has macros named as OpenVDB's members are.

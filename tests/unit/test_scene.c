@@ -1,7 +1,7 @@
 /* Scenes: what their keys become, and which scenes are refused: wrong, damaged, too large, not there. */
 #include "base/error.h"
 #include "fields.h"
-#include "sandbox/reader.h"
+#include "io/reader/reader.h"
 #include "scenes.h"
 #include "shade/shade.h"
 #include "testing.h"

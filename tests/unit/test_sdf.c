@@ -2,7 +2,7 @@
 #include "fields.h"
 #include "testing.h"
 
-#include "sdf/sdf.h"
+#include "geometry/sdf.h"
 
 static uint64_t counter = 1;
 

@@ -1,5 +1,5 @@
 /* stitch_one(): values on both sides of charts' borders agree, and nothing else moves. */
-#include "bake/seams.h"
+#include "lightmap/seams.h"
 #include "seams.h"
 #include "testing.h"
 

@@ -3,7 +3,7 @@
 #include "kinds.h"
 #include "testing.h"
 
-#include "mesh/edges.h"
+#include "geometry/edges.h"
 #include "shade/shade.h"
 #include "trace/embree.h"
 #include "traced.h"

@@ -5,7 +5,7 @@
 #include "truth/directions.h"
 #include "truth/metrics.h"
 
-#include "spheres/spheres.h"
+#include "shapes/spheres.h"
 
 enum { POINTS = 400, RAYS = 1024, MOST = 400 };
 

@@ -1,5 +1,5 @@
 /* Texels: places in UV space, coverage, what is refused and counted, and what normals do. */
-#include "bake/texels.h"
+#include "lightmap/texels.h"
 #include "testing.h"
 #include "texels_of.h"
 
@@ -219,7 +219,8 @@ TEST(bad_sizes_and_uvs_are_refused_with_the_value_and_the_limit) {
     padded.padding = 4097;
     narrowed.padding = -2; /* -1 is VSH_PADDING_AUTO */
     assert_refused(&q.mesh, size_of(0, 8, 1), VSH_ERROR_ARGUMENT, "width 0 is out of range", "65536");
-    assert_refused(&q.mesh, size_of(8, 1000000, 1), VSH_ERROR_ARGUMENT, "height 1e+06 is out of range", "65536");
+    assert_refused(&q.mesh, size_of(8, 1000000, 1), VSH_ERROR_ARGUMENT, "height 1e+06 is out of range",
+                   "65536");
     assert_refused(&q.mesh, size_of(8, -1, 1), VSH_ERROR_ARGUMENT, "height -1", "");
     assert_refused(&q.mesh, size_of(8, 8, 17), VSH_ERROR_ARGUMENT, "supersample 17", "16");
     assert_refused(&q.mesh, padded, VSH_ERROR_ARGUMENT, "padding 4097", "4096");

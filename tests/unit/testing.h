@@ -1,8 +1,7 @@
 /* Every test includes this: the C library, the public headers, and checks of results and numbers. Tests list
  * themselves, and variables free their memory. A test is TEST(claim) { … }. main.c runs the tests of a
  * program; a main() of its own returns run_all_tests(). */
-#ifndef TESTS_TESTING_H
-#define TESTS_TESTING_H
+#pragma once
 
 #include <float.h>
 #include <math.h>
@@ -16,41 +15,37 @@
 #include <string.h>
 #include <unistd.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 #include <cmocka.h>
 
 /* Runs what the program lists; main.c calls it. */
 __attribute__((weak)) int run_listed_tests(void);
-#ifdef __cplusplus
-}
-#endif
+VSH_END_C
 
 #include <vdbshade/vdbshade.h>
 
 #ifndef __cplusplus
-#include "bake/planes.h"
-#include "bake/texels.h"
 #include "base/job.h"
 #include "bindings/bindings.h"
 #include "compare/compare.h"
 #include "field/field.h"
 #include "flat/flat.h"
-#include "heightfield/heights.h"
-#include "image/image.h"
+#include "geometry/mesh.h"
+#include "geometry/sdf.h"
+#include "io/image/image.h"
+#include "io/lit/work.h"
+#include "io/model/model.h"
 #include "levelset/access.h"
-#include "lit/work.h"
-#include "mesh/mesh.h"
-#include "method/method.h"
-#include "model/model.h"
-#include "outline/outline.h"
+#include "light/method.h"
+#include "lightmap/planes.h"
+#include "lightmap/texels.h"
 #include "scene/assets.h"
 #include "scene/scene.h"
-#include "sdf/sdf.h"
 #include "shade/occluders.h"
 #include "shade/shade.h"
-#include "spheres/spheres.h"
+#include "shapes/heights.h"
+#include "shapes/outline.h"
+#include "shapes/spheres.h"
 #include "trace/trace.h"
 #endif
 
@@ -313,5 +308,3 @@ static inline vsh_mesh box_mesh(float corners[24], const double low[3], const do
     mesh.triangle_count = 12;
     return mesh;
 }
-
-#endif

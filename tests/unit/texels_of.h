@@ -1,6 +1,5 @@
 /* Texels of small meshes, for their tests. */
-#ifndef TESTS_TEXELS_OF_H
-#define TESTS_TEXELS_OF_H
+#pragma once
 
 #include "previews.h"
 #include "testing.h"
@@ -95,5 +94,3 @@ static inline void free_sphere(sphere *s) {
     free(s->normals);
     free(s->positions);
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Casters that are marched and traced: a field, and the same solids as triangles, so that a test can ask
  * every method for the same thing. */
-#ifndef TESTS_TRACED_H
-#define TESTS_TRACED_H
+#pragma once
 
 #include "previews.h"
 #include "shading.h"
@@ -187,5 +186,3 @@ static inline void shade_kind(const casting *c, int kind, const vsh_light *light
         shade_points(occluders_of_caster(c), points, light, &options, NULL, values, NULL);
     }
 }
-
-#endif

@@ -1,7 +1,6 @@
 /* Looks at an atlas by code of its own: which texels triangles touch, which centres they have, how they
  * stretch. */
-#ifndef TESTS_UNWRAPS_H
-#define TESTS_UNWRAPS_H
+#pragma once
 
 #include "shapes.h"
 #include "testing.h"
@@ -358,5 +357,3 @@ static inline double next_number(uint64_t *state) {
     *state = *state * 6364136223846793005u + 1442695040888963407u;
     return (double)(*state >> 11) * 0x1p-53;
 }
-
-#endif

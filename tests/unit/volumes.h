@@ -1,6 +1,5 @@
 /* Short ways to bake volumes, for their tests. */
-#ifndef TESTS_VOLUMES_H
-#define TESTS_VOLUMES_H
+#pragma once
 
 #include "shading.h"
 #include "testing.h"
@@ -78,5 +77,3 @@ static inline float *distances_of(const vsh_field *field, size_t count, const do
     vsh_field_sample(field, count, positions, distances);
     return distances;
 }
-
-#endif

@@ -75,9 +75,8 @@ def declarations(text):
     """Declarations for cffi: no comments, no directives, no inline functions."""
     text = COMMENT.sub(" ", text)
     text = re.sub(r"^#.*(?:\\\n.*)*$", "", text, flags=re.M)
-    text = re.sub(r'extern "C" \{', "", text)
+    text = re.sub(r"^VSH_(BEGIN|END)_C$", "", text, flags=re.M)
     text = _inline_removed(text).replace("VSH_API ", "").replace("VSHI_SHARED ", "")
-    text = re.sub(r"^\}\s*$", "", text, flags=re.M)  # of extern "C"
     return re.sub(r"\n\s*\n+", "\n", text).strip() + "\n"
 
 

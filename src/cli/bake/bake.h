@@ -1,6 +1,5 @@
 /* The options of `vdbshade bake`, and the scene that they make of its input. Other commands share them. */
-#ifndef CLI_BAKE_H
-#define CLI_BAKE_H
+#pragma once
 
 #include "cli/cli.h"
 
@@ -133,5 +132,3 @@ void cli_shading_free(cli_shading *shading);
 /* Load the assets, and make the occluders. */
 int cli_shading_load(cli_shading *shading);
 int cli_shading_cast(cli_shading *shading, const vsh_scene_occluders_options *what);
-
-#endif

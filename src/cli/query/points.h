@@ -2,11 +2,10 @@
  *
  * A row is bad if a column is missing or no number, if a position or normal is not finite, or if a normal is
  * zero. A bad row keeps its place and the values that could be read; the others are NaN. */
-#ifndef CLI_POINTS_H
-#define CLI_POINTS_H
+#pragma once
 
 #include "cli/cli.h"
-#include "table/table.h"
+#include "io/table.h"
 
 /* Rows in memory. */
 typedef struct cli_points {
@@ -83,5 +82,3 @@ int cli_points_writer_open(const char *path, int32_t format, bool answers_only,
 int cli_points_write(cli_points_writer *writer, const cli_points *points);
 int cli_points_writer_commit(cli_points_writer *writer, cli_points_reader *reader);
 void cli_points_writer_free(cli_points_writer *writer); /* abandons an output that is not committed */
-
-#endif

@@ -1,6 +1,5 @@
 /* Nearest points of the surface (feet) of a block's voxels, among feet that other voxels know. */
-#ifndef VSHI_FEET_KERNEL_H
-#define VSHI_FEET_KERNEL_H
+#pragma once
 
 #include "field/field.h"
 
@@ -33,6 +32,4 @@ typedef void vshi_nearest_fn(const vshi_feet *points, const uint64_t wanted[8], 
 extern vshi_nearest_fn vshi_feet_base;
 #if defined(__x86_64__)
 extern vshi_nearest_fn vshi_feet_avx2, vshi_feet_avx512;
-#endif
-
 #endif

@@ -1,15 +1,12 @@
 /* Distances of a leaf's voxels to triangles. */
-#ifndef VSHI_LEAF_KERNEL_H
-#define VSHI_LEAF_KERNEL_H
+#pragma once
 
 #include "base/error.h"
 
 #include <stddef.h>
 #include <stdint.h>
 
-#ifdef __cplusplus
-extern "C" {
-#endif
+VSH_BEGIN_C
 
 /* A triangle as seven linear functions of a place (x, y, z) relative to the middle of a region: row[0] x +
  * row[1] y + row[2] z + row[3]. HEIGHT is the height over its plane. BESIDE, for each edge, is the distance
@@ -48,7 +45,4 @@ extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_avx2;
 extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_avx512;
 #endif
 
-#ifdef __cplusplus
-}
-#endif
-#endif
+VSH_END_C

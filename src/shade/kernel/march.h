@@ -1,6 +1,5 @@
 /* Marching: many rays against a field, over lanes. */
-#ifndef VSHI_MARCH_H
-#define VSHI_MARCH_H
+#pragma once
 
 #include "field/field.h"
 
@@ -79,5 +78,3 @@ extern const vshi_kernel vshi_kernel_avx512;
 
 /* The kernel of a VSH_ISA_… that this machine has; see base.h. */
 const vshi_kernel *vshi_kernel_of(int32_t isa);
-
-#endif

@@ -1,0 +1,97 @@
+#define _GNU_SOURCE
+
+#include "base/module.h"
+
+#include "base/error.h"
+#include "base/threads.h"
+
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/mman.h>
+
+/* Opens the module in a folder below this library's; NULL: it is not there. */
+static void *open_beside(const char *folder, const char *file) {
+    static const char of_this_library = 0;
+    Dl_info here;
+    char path[4096];
+    const bool known = dladdr(&of_this_library, &here) != 0 && here.dli_fname != NULL;
+    /* the host may have left the folder that a relative path begins at */
+    const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
+    if (end == NULL || (size_t)snprintf(path, sizeof path, "%.*s/%s%s", (int)(end - here.dli_fname),
+                                        here.dli_fname, folder, file) >= sizeof path) {
+        return NULL;
+    }
+    return dlopen(path, RTLD_LAZY | RTLD_LOCAL);
+}
+
+/* Searches beside this library (as built), in its folder vdbshade (as installed), then on the loader's path.
+ * In a host with a sanitizer, which replaces dlopen(), the loader does not search beside this library. */
+static void *open_module(const char *file) {
+    void *module = open_beside("", file);
+    module = module != NULL ? module : open_beside("vdbshade/", file);
+    return module != NULL ? module : dlopen(file, RTLD_LAZY | RTLD_LOCAL);
+}
+
+static bool has_room(size_t bytes) {
+    void *room = mmap(NULL, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    if (room != MAP_FAILED) {
+        munmap(room, bytes);
+    }
+    return room != MAP_FAILED;
+}
+
+/* Exceptions while libraries load (their statics, refused memory or threads) end the process, so this checks
+ * their needs before. */
+static vsh_result check_room(const vshi_module *module, vsh_error *error) {
+    errno = 0;
+    if (module->threads > 0 && !vshi_threads_left(module->threads)) {
+        return errno == ENOMEM
+                   ? vshi_fail_memory(error, module->what)
+                   : vshi_fail(
+                         error, VSH_ERROR_MEMORY,
+                         "threads: the system refuses the %d that OpenVDB's libraries begin; %s need it",
+                         module->threads, module->what);
+    }
+    return has_room(module->room)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused the %zu MB that %s takes",
+                           module->what, module->room / 1000000, module->file);
+}
+
+static vsh_result load(vshi_module *module, vsh_error *error) {
+    VSHI_TRY(check_room(module, error));
+    errno = 0;
+    void *opened = open_module(module->file);
+    if (opened == NULL && errno == ENOMEM) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused the memory that %s takes",
+                         module->what, module->file);
+    }
+    const void *table = opened != NULL ? dlsym(opened, module->symbol) : NULL;
+    if (table == NULL) {
+        const char *why = dlerror();
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need a module that cannot be loaded: %s",
+                         module->what, why != NULL ? why : module->file);
+    }
+    const char *version = *(const char *const *)table;
+    if (strcmp(version, VSHI_VERSION) != 0) {
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need %s, which is of version %s here",
+                         module->what, module->file, version);
+    }
+    atomic_store_explicit(&module->table, table, memory_order_release);
+    return VSH_OK;
+}
+
+static vsh_result load_once(void *user, vsh_error *error) {
+    vshi_module *module = user;
+    pthread_mutex_lock(&module->lock);
+    const vsh_result result = vshi_module_table(module) == NULL ? load(module, error) : VSH_OK;
+    pthread_mutex_unlock(&module->lock);
+    return result;
+}
+
+vsh_result vshi_module_load(vshi_module *module, vsh_error *error) {
+    return vshi_module_table(module) != NULL ? VSH_OK : vshi_on_stack(load_once, module, error);
+}

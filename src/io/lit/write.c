@@ -1,0 +1,756 @@
+/* A lit document, or an OBJ, written into its files. */
+#define _GNU_SOURCE /* fopencookie */
+#include "base/decimal.h"
+#include "base/file.h"
+#include "base/text.h"
+#include "base/vec.h"
+#include "io/lit/work.h"
+
+#include <inttypes.h>
+#include <stdlib.h>
+#include <string.h>
+#include <strings.h>
+#include <sys/stat.h>
+
+typedef struct writing {
+    vshi_lit_work *work;
+    const vshi_lit_besides *besides;
+    char *bin;              /* name of the file of the buffer, or of an OBJ's materials; NULL: none */
+    vshi_lit_stream *files; /* [file_count]: those of `besides`, then `bin`, then the output */
+    vshi_output **outputs;  /* [file_count]: of the files */
+    char **paths;           /* [file_count] */
+    size_t file_count;
+    size_t *offsets; /* [buffer_count]: of each in the buffer that is written; SIZE_MAX: it has no bytes
+                        (EXT_meshopt_compression's fallback). One block with numbers */
+    size_t *numbers; /* [buffer_count]: of each in the new list */
+    size_t added;    /* offset of the added bytes */
+    size_t size;     /* of the buffer */
+} writing;
+
+/* --- a file as a stream */
+
+static ssize_t write_to_sink(void *user, const char *bytes, size_t size) {
+    vshi_lit_stream *stream = user;
+    vshi_sink_write(&stream->sink, bytes, size, stream->written);
+    stream->written += size;
+    return (ssize_t)size;
+}
+
+vsh_result vshi_lit_begin_stream(vshi_lit_stream *stream, const char *path, vsh_error *error) {
+    stream->path = path;
+    VSHI_TRY(vshi_output_begin(&stream->output, path, error));
+    stream->sink = vshi_sink_open(stream->output.temporary);
+    stream->to = fopencookie(stream, "w", (cookie_io_functions_t){.write = write_to_sink});
+    if (stream->to == NULL) {
+        vshi_sink_close(&stream->sink);
+        vshi_output_abandon(&stream->output);
+        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_end_stream(vshi_lit_stream *stream, vsh_result result, vsh_error *error) {
+    fclose(stream->to);
+    const int reason = vshi_sink_close(&stream->sink);
+    return result != VSH_OK || reason == 0 ? result
+                                           : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s",
+                                                       stream->path, strerror(reason));
+}
+
+bool vshi_lit_is_obj(const char *path) {
+    return strcasecmp(vshi_path_ending(path), "obj") == 0;
+}
+
+/* --- names of files beside the output */
+
+bool vshi_lit_is_same_file(const char *a, const char *b) {
+    struct stat one, other;
+    return stat(a, &one) == 0 && stat(b, &other) == 0 && one.st_dev == other.st_dev &&
+           one.st_ino == other.st_ino;
+}
+
+vsh_result vshi_lit_check_replaced(const vshi_lit_work *work, const char *path, vsh_error *error) {
+    static const char *const lists[] = {"buffers", "images"};
+    json_t *const own[] = {json_object_get(work->gltf.root, "buffers"), work->own_images};
+    for (size_t k = 0; k < sizeof lists / sizeof lists[0] && work->text != NULL; ++k) {
+        size_t i;
+        const json_t *item;
+        json_array_foreach(own[k], i, item) {
+            const char *uri = json_string_value(json_object_get(item, "uri"));
+            if (uri == NULL || vshi_uri_is_data(uri) || vshi_uri_is_remote(uri)) {
+                continue;
+            }
+            char *given = vshi_uri_path(work->gltf.path, uri);
+            if (given == NULL) {
+                return vshi_lit_fail_memory(work, error);
+            }
+            const bool same = vshi_lit_is_same_file(given, path);
+            free(given);
+            if (same) {
+                return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: would replace %s[%zu] of %s", path, lists[k],
+                                 i, work->gltf.path);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* A number of 0 is left out. */
+static char *make_name(const char *output, const char *mark, const char *ending, unsigned number) {
+    const char *slash = strrchr(output, '/');
+    const char *name = slash != NULL ? slash + 1 : output;
+    const char *own = vshi_path_ending(output);
+    const size_t stem = own[0] != '\0' ? (size_t)(own - name) - 1 : strlen(name);
+    const size_t size = stem + strlen(mark) + strlen(ending) + 16;
+    char *made = malloc(size);
+    if (made != NULL && number > 0) {
+        snprintf(made, size, "%.*s%s.%u.%s", (int)stem, name, mark, number, ending);
+    } else if (made != NULL) {
+        snprintf(made, size, "%.*s%s.%s", (int)stem, name, mark, ending);
+    }
+    return made;
+}
+
+vsh_result vshi_lit_name_beside(const vshi_lit_work *work, const char *mark, const char *ending, char **name,
+                                vsh_error *error) {
+    enum { MOST = 100 };
+    for (unsigned number = 0;; ++number) {
+        *name = make_name(work->output, mark, ending, number);
+        char *path = *name != NULL ? vshi_path_beside(work->output, *name, strlen(*name)) : NULL;
+        if (path == NULL) {
+            free(*name);
+            *name = NULL;
+            return vshi_lit_fail_memory(work, error);
+        }
+        const vsh_result result = vshi_lit_check_replaced(work, path, error);
+        free(path);
+        if (result != VSH_ERROR_ARGUMENT || number == MOST) {
+            return result;
+        }
+        free(*name);
+    }
+}
+
+/* Percent-encodes all but unreserved characters (RFC 3986). */
+json_t *vshi_lit_uri(const char *name) {
+    char *text = malloc(3 * strlen(name) + 1), *to = text;
+    if (text == NULL) {
+        return NULL;
+    }
+    *to = '\0';
+    for (const char *c = name; *c != '\0'; ++c) {
+        const unsigned char byte = (unsigned char)*c;
+        const bool plain = (byte >= 'a' && byte <= 'z') || (byte >= 'A' && byte <= 'Z') ||
+                           (byte >= '0' && byte <= '9') || strchr("-._~", byte) != NULL;
+        to += sprintf(to, plain ? "%c" : "%%%02X", byte);
+    }
+    json_t *uri = json_string(text);
+    free(text);
+    return uri;
+}
+
+/* --- JSON: members in their order, and the shortest numbers that read back as they were */
+
+typedef struct writer {
+    FILE *to;
+    bool lines;
+    int depth;
+} writer;
+
+static void write_string(const writer *w, const char *string, size_t size) {
+    size_t plain = 0; /* start of the bytes not written yet */
+    fputc('"', w->to);
+    for (size_t i = 0; i < size; ++i) {
+        const unsigned char byte = (unsigned char)string[i];
+        if (byte < 0x20 || byte == '"' || byte == '\\') {
+            fwrite(string + plain, 1, i - plain, w->to);
+            fprintf(w->to, byte >= 0x20 ? "\\%c" : "\\u%04x", byte);
+            plain = i + 1;
+        }
+    }
+    fwrite(string + plain, 1, size - plain, w->to);
+    fputc('"', w->to);
+}
+
+static void begin_line(const writer *w) {
+    if (w->lines) {
+        fprintf(w->to, "\n%*s", 2 * w->depth, "");
+    }
+}
+
+static void write_value(writer *w, const json_t *value);
+
+static void write_object(writer *w, const json_t *object) {
+    const char *name;
+    json_t *member;
+    bool first = true;
+    fputc('{', w->to);
+    ++w->depth;
+    json_object_foreach((json_t *)(uintptr_t)object, name, member) {
+        fputs(first ? "" : ",", w->to);
+        first = false;
+        begin_line(w);
+        write_string(w, name, strlen(name));
+        fputs(w->lines ? ": " : ":", w->to);
+        write_value(w, member);
+    }
+    --w->depth;
+    if (!first) {
+        begin_line(w);
+    }
+    fputc('}', w->to);
+}
+
+/* Lists of numbers stay in one line. */
+static void write_array(writer *w, const json_t *array) {
+    size_t i;
+    const json_t *item;
+    const bool short_one =
+        !json_is_object(json_array_get(array, 0)) && !json_is_array(json_array_get(array, 0));
+    fputc('[', w->to);
+    ++w->depth;
+    json_array_foreach(array, i, item) {
+        fputs(i == 0 ? "" : w->lines && short_one ? ", " : ",", w->to);
+        if (!short_one) {
+            begin_line(w);
+        }
+        write_value(w, item);
+    }
+    --w->depth;
+    if (!short_one) {
+        begin_line(w);
+    }
+    fputc(']', w->to);
+}
+
+static void write_value(writer *w, const json_t *value) {
+    char number[VSHI_DECIMAL_ROOM];
+    switch (json_typeof(value)) {
+    case JSON_OBJECT:
+        write_object(w, value);
+        break;
+    case JSON_ARRAY:
+        write_array(w, value);
+        break;
+    case JSON_STRING:
+        write_string(w, json_string_value(value), json_string_length(value));
+        break;
+    case JSON_INTEGER:
+        fprintf(w->to, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
+        break;
+    case JSON_REAL:
+        fwrite(number, 1, (size_t)(vshi_decimal_write_double(number, json_real_value(value)) - number),
+               w->to);
+        break;
+    default:
+        fputs(json_is_true(value) ? "true" : json_is_false(value) ? "false" : "null", w->to);
+        break;
+    }
+}
+
+/* --- the buffers become one */
+
+static bool has_bytes(const vshi_lit_work *work, size_t index) {
+    const bool chunk = index == 0 && work->gltf.binary;
+    return chunk || json_object_get(vshi_gltf_element(&work->gltf, "buffers", index), "uri") != NULL;
+}
+
+/* Counts the dropped bytes of a buffer in front of `offset`. */
+static size_t count_dropped(const vshi_lit_work *work, size_t buffer, size_t offset) {
+    size_t sum = 0;
+    for (size_t i = 0; i < work->dropped.count; ++i) {
+        const vshi_lit_range *range = &work->dropped.list[i];
+        const size_t end = range->end < offset ? range->end : offset;
+        sum += range->buffer == buffer && end > range->begin ? end - range->begin : 0;
+    }
+    return sum;
+}
+
+/* Reads the buffers that have not been read, and finds their places. Errors: as vsh_model_read(). */
+static vsh_result place_buffers(writing *w, vsh_error *error) {
+    enum { ALIGNMENT = 8 };
+    vshi_gltf *gltf = &w->work->gltf;
+    const vshi_array arrays[] = {VSHI_ARRAY(w->offsets, gltf->buffer_count),
+                                 VSHI_ARRAY(w->numbers, gltf->buffer_count)};
+    VSHI_TRY(VSHI_LIT_ALLOCATE(w->work, arrays, error));
+    for (size_t i = 0; i < gltf->buffer_count; ++i) {
+        w->offsets[i] = SIZE_MAX;
+        if (has_bytes(w->work, i)) {
+            VSHI_TRY(vshi_gltf_load(gltf, i, error));
+            w->offsets[i] = w->size;
+            const size_t size = gltf->buffers[i].bytes.size;
+            w->size += (size - count_dropped(w->work, i, size) + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+        }
+    }
+    w->added = w->size;
+    w->size += w->work->added.count;
+    return VSH_OK;
+}
+
+static bool lies_in_added(const vshi_lit_work *work, size_t view) {
+    return view >= work->first_view || (work->replaced != NULL && work->replaced[view]);
+}
+
+/* Whether a view still refers to a buffer without bytes, or nothing has been dropped. */
+static bool is_needed(const vshi_lit_work *work, size_t buffer) {
+    size_t i, of;
+    const json_t *view;
+    json_array_foreach(json_object_get(work->gltf.root, "bufferViews"), i, view) {
+        if (!lies_in_added(work, i) && vshi_gltf_count(view, "buffer", SIZE_MAX, &of) && of == buffer) {
+            return true;
+        }
+    }
+    return work->dropped.count == 0;
+}
+
+/* Makes the new list: one buffer of all bytes, which is the first that had any, then those without. Returns
+ * the one buffer; NULL: there are no bytes. */
+static json_t *list_buffers(writing *w) {
+    vshi_lit_work *work = w->work;
+    vshi_gltf *gltf = &work->gltf;
+    json_t *list = json_array(), *old = json_object_get(gltf->root, "buffers"), *one = NULL;
+    for (size_t i = 0; i < gltf->buffer_count && one == NULL; ++i) {
+        one = w->offsets[i] != SIZE_MAX ? json_incref(json_array_get(old, i)) : NULL;
+    }
+    if (one != NULL || w->size > 0) {
+        one = one != NULL ? one : json_object();
+        vshi_lit_push(work, list, one);
+    }
+    for (size_t i = 0; i < gltf->buffer_count; ++i) {
+        w->numbers[i] = w->offsets[i] != SIZE_MAX ? 0 : json_array_size(list);
+        if (w->offsets[i] == SIZE_MAX && is_needed(work, i)) {
+            vshi_lit_push(work, list, json_incref(json_array_get(old, i)));
+        }
+    }
+    if (json_array_size(list) > 0) {
+        vshi_lit_set(work, gltf->root, "buffers", list);
+    } else {
+        json_object_del(gltf->root, "buffers");
+        json_decref(list);
+    }
+    return one;
+}
+
+/* Moves the reference of a view, or of an extension of it with a buffer of its own. */
+static vsh_result move_view(const writing *w, json_t *view, vsh_error *error) {
+    const vshi_gltf *gltf = &w->work->gltf;
+    size_t buffer, offset;
+    if (!vshi_gltf_count(view, "buffer", SIZE_MAX, &buffer) || buffer >= gltf->buffer_count ||
+        !vshi_gltf_count(view, "byteOffset", 0, &offset)) {
+        return vshi_gltf_fail(gltf, error, "a buffer view refers to no buffer");
+    }
+    vshi_lit_set_number(w->work, view, "buffer", w->numbers[buffer]);
+    const size_t base = w->offsets[buffer] != SIZE_MAX ? w->offsets[buffer] : 0;
+    const size_t moved = base + offset - count_dropped(w->work, buffer, offset);
+    if (moved != offset) {
+        vshi_lit_set_number(w->work, view, "byteOffset", moved);
+    }
+    return VSH_OK;
+}
+
+static vsh_result move_views(const writing *w, vsh_error *error) {
+    size_t i;
+    json_t *view;
+    json_array_foreach(json_object_get(w->work->gltf.root, "bufferViews"), i, view) {
+        if (lies_in_added(w->work, i)) {
+            const size_t at = (size_t)json_integer_value(json_object_get(view, "byteOffset"));
+            vshi_lit_set_number(w->work, view, "buffer", 0);
+            vshi_lit_set_number(w->work, view, "byteOffset", at + w->added);
+            continue;
+        }
+        VSHI_TRY(move_view(w, view, error));
+        const char *name;
+        json_t *extension;
+        json_object_foreach(json_object_get(view, "extensions"), name, extension) {
+            if (json_object_get(extension, "buffer") != NULL) {
+                VSHI_TRY(move_view(w, extension, error));
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* Makes the buffers one, in the file w->bin or (NULL) in the document. */
+static vsh_result join_buffers(writing *w, vsh_error *error) {
+    vshi_lit_work *work = w->work;
+    json_t *one = list_buffers(w);
+    VSHI_TRY(move_views(w, error));
+    if (work->dropped.count > 0) { /* perhaps the last compressed views */
+        vshi_lit_drop_extension(work, "EXT_meshopt_compression");
+        vshi_lit_drop_extension(work, "KHR_meshopt_compression");
+    }
+    if (one != NULL) {
+        vshi_lit_set_number(work, one, "byteLength", w->size);
+        json_object_del(one, "uri");
+    }
+    if (w->bin != NULL) {
+        vshi_lit_set(work, one, "uri", vshi_lit_uri(w->bin));
+    }
+    return work->refused ? vshi_lit_fail_memory(work, error) : VSH_OK;
+}
+
+/* --- a glTF */
+
+static void write_padding(FILE *to, uint64_t count, char with) {
+    for (; count > 0; --count) {
+        fputc(with, to);
+    }
+}
+
+static void write_word(FILE *to, uint64_t number) {
+    for (int shift = 0; shift < 32; shift += 8) {
+        fputc((int)(number >> shift & 255), to);
+    }
+}
+
+/* Writes bytes begin … end - 1. An empty buffer has no bytes to point to. */
+static void write_range(const unsigned char *bytes, size_t begin, size_t end, FILE *to) {
+    if (begin < end) {
+        fwrite(bytes + begin, 1, end - begin, to);
+    }
+}
+
+/* Writes all buffers, without the dropped bytes, and the added bytes. */
+static void write_buffers(const writing *w, FILE *to) {
+    const vshi_lit_work *work = w->work;
+    size_t written = 0;
+    for (size_t b = 0; b < work->gltf.buffer_count; ++b) {
+        const vshi_gltf_bytes bytes = work->gltf.buffers[b].bytes;
+        size_t at = 0;
+        if (w->offsets[b] == SIZE_MAX) {
+            continue;
+        }
+        write_padding(to, w->offsets[b] - written, '\0');
+        for (size_t i = 0; i < work->dropped.count; ++i) {
+            const vshi_lit_range *range = &work->dropped.list[i];
+            if (range->buffer == b && range->begin < bytes.size) {
+                write_range(bytes.at, at, range->begin, to);
+                at = range->end < bytes.size ? range->end : bytes.size;
+            }
+        }
+        write_range(bytes.at, at, bytes.size, to);
+        written = w->offsets[b] + bytes.size - count_dropped(work, b, bytes.size);
+    }
+    write_padding(to, w->added - written, '\0');
+    write_range(work->added.list, 0, work->added.count, to);
+}
+
+/* Writes a GLB (glTF 2.0, 4.4). */
+static vsh_result write_chunks(const writing *w, const char *json, size_t json_size, FILE *to,
+                               vsh_error *error) {
+    enum { HEADER = 12, CHUNK = 8, JSON_CHUNK = 0x4e4f534a, BINARY_CHUNK = 0x004e4942 };
+    const uint64_t text = ((uint64_t)json_size + 3) & ~UINT64_C(3),
+                   bytes = ((uint64_t)w->size + 3) & ~UINT64_C(3);
+    const uint64_t all = HEADER + CHUNK + text + (bytes > 0 ? CHUNK + bytes : 0);
+    if (all > UINT32_MAX) {
+        return vshi_fail(error, VSH_ERROR_LIMIT,
+                         "%s: %llu bytes, but a GLB can have %u; a .gltf can have more", w->work->output,
+                         (unsigned long long)all, UINT32_MAX);
+    }
+    fputs("glTF", to);
+    write_word(to, 2);
+    write_word(to, all);
+    write_word(to, text);
+    write_word(to, JSON_CHUNK);
+    fwrite(json, 1, json_size, to);
+    write_padding(to, text - json_size, ' ');
+    if (bytes > 0) {
+        write_word(to, bytes);
+        write_word(to, BINARY_CHUNK);
+        write_buffers(w, to);
+        write_padding(to, bytes - w->size, '\0');
+    }
+    return VSH_OK;
+}
+
+/* Writes the JSON, with lines and indents, or a GLB with the JSON first, whose size precedes it. */
+static vsh_result write_document(const writing *w, bool binary, FILE *to, vsh_error *error) {
+    char *json = NULL;
+    size_t size = 0;
+    writer text = {.to = binary ? open_memstream(&json, &size) : to, .lines = !binary};
+    if (text.to == NULL) {
+        return vshi_lit_fail_memory(w->work, error);
+    }
+    write_value(&text, w->work->gltf.root);
+    if (!binary) {
+        fputc('\n', to);
+        return VSH_OK;
+    }
+    const bool failed = ferror(text.to) != 0;
+    const vsh_result result = fclose(text.to) != 0 || failed ? vshi_lit_fail_memory(w->work, error)
+                                                             : write_chunks(w, json, size, to, error);
+    free(json);
+    return result;
+}
+
+vsh_result vshi_lit_write_model(const vsh_model *model, const char *path, const vsh_run *run, vshi_job *job,
+                                FILE *to, vsh_error *error) {
+    vshi_lit_work work = {.model = model, .output = path, .gltf = {.path = path, .run = run, .job = job}};
+    writing w = {.work = &work};
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_lit_begin(&work, error));
+    VSHI_TRY_DONE(vshi_lit_from_model(&work, error));
+    VSHI_TRY_DONE(place_buffers(&w, error));
+    VSHI_TRY_DONE(join_buffers(&w, error));
+    result = write_document(&w, true, to, error);
+done:
+    free(w.offsets);
+    vshi_lit_work_free(&work);
+    return result;
+}
+
+/* --- an OBJ, with its materials in a file beside it */
+
+static const char FIRST_LINE[] = "# vdbshade ";
+
+/* Blanks and control characters become "_". */
+static void write_name(FILE *to, const char *keyword, const char *name) {
+    fprintf(to, "%s ", keyword);
+    for (; *name != '\0'; ++name) {
+        fputc((unsigned char)*name <= ' ' || *name == 0x7f ? '_' : *name, to);
+    }
+    fputc('\n', to);
+}
+
+/* Writes the material of a page, by its name or number. */
+static void write_page(FILE *to, const vshi_lit_work *work, const char *keyword, size_t page) {
+    const vsh_lit_options *options = work->options;
+    const char *name = page < options->page_count ? options->page_names[page] : NULL;
+    if (name != NULL) {
+        write_name(to, keyword, name);
+    } else {
+        fprintf(to, "%s page_%zu\n", keyword, page);
+    }
+}
+
+/* A mesh with its lightmap UVs, and the numbers of its first vertices: OBJ counts over the whole file. */
+typedef struct obj_mesh {
+    vsh_mesh mesh;
+    const vsh_lit_mesh *lit;
+    const float *uvs;                  /* NULL: unlit */
+    const uint32_t *indices, *sources; /* sources NULL: vertices are the mesh's own */
+    size_t uv_count;
+    uint64_t first_position, first_uv, first_normal;
+} obj_mesh;
+
+static void open_mesh(const vshi_lit_work *work, size_t index, obj_mesh *m) {
+    const vsh_lit_mesh *lit = m->lit = &work->meshes[index];
+    const bool made = lit->uvs != NULL;
+    m->mesh = vsh_model_mesh(work->model, index, made ? 0 : lit->uv_set);
+    m->uvs = made ? lit->uvs : lit->uv_set >= 0 ? m->mesh.uvs : NULL;
+    m->indices = made ? lit->indices : m->mesh.indices;
+    m->sources = made ? lit->sources : NULL;
+    m->uv_count = made ? lit->vertex_count : m->uvs != NULL ? m->mesh.vertex_count : 0;
+}
+
+/* `same_object`: the mesh before belongs to the same object. */
+static void write_names(FILE *to, const vsh_mesh *mesh, bool same_object, size_t index) {
+    const char *name = mesh->name != NULL && mesh->name[0] != '\0' ? mesh->name : NULL;
+    const char *object = mesh->object_name != NULL && mesh->object_name[0] != '\0' ? mesh->object_name : name;
+    if (object == NULL) {
+        fprintf(to, "o mesh_%zu\n", index);
+        return;
+    }
+    if (!same_object) {
+        write_name(to, "o", object);
+    }
+    if (name != NULL && strcmp(name, object) != 0) {
+        write_name(to, "g", name);
+    }
+}
+
+static void write_vertices(FILE *to, const obj_mesh *m) {
+    const vsh_mesh *mesh = &m->mesh;
+    for (size_t v = 0; v < mesh->vertex_count; ++v) {
+        const vshi_vec at = vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * v));
+        fprintf(to, "v %.9g %.9g %.9g\n", at.x, at.y, at.z);
+    }
+    for (size_t v = 0; v < m->uv_count; ++v) {
+        fprintf(to, "vt %.9g %.9g\n", (double)m->uvs[2 * v], (double)m->uvs[2 * v + 1]);
+    }
+    for (size_t v = 0; mesh->normals != NULL && v < mesh->vertex_count; ++v) {
+        const vshi_vec n =
+            vshi_unit(vshi_transform_normal(mesh->transform, vshi_vec_off(mesh->normals + 3 * v)));
+        fprintf(to, "vn %.6g %.6g %.6g\n", n.x, n.y, n.z);
+    }
+}
+
+static void write_face(FILE *to, const obj_mesh *m, size_t triangle) {
+    const bool mirrored = vshi_transform_determinant(m->mesh.transform) < 0.0; /* faces look outwards */
+    fprintf(to, "f");
+    for (size_t i = 0; i < 3; ++i) {
+        const uint32_t v = m->indices[3 * triangle + (mirrored ? 2 - i : i)];
+        const uint64_t source = m->sources != NULL ? m->sources[v] : v;
+        fprintf(to, " %" PRIu64, m->first_position + source);
+        if (m->uvs != NULL) {
+            fprintf(to, "/%" PRIu64, m->first_uv + v);
+        }
+        if (m->mesh.normals != NULL) {
+            fprintf(to, m->uvs != NULL ? "/%" PRIu64 : "//%" PRIu64, m->first_normal + source);
+        }
+    }
+    fprintf(to, "\n");
+}
+
+/* With `paged`, names the material of each page. Triangles without a place show the first page. */
+static void write_faces(FILE *to, const vshi_lit_work *work, const obj_mesh *m, bool paged) {
+    const bool shown = m->uvs != NULL;
+    uint32_t page = UINT32_MAX;
+    if (paged && !shown) {
+        fprintf(to, "usemtl unlit\n");
+    }
+    for (size_t i = 0; i < m->mesh.triangle_count; ++i) {
+        const uint32_t found = shown ? vshi_page_of_triangle(work, m->lit, i) : 0;
+        const uint32_t own = found != VSH_NO_CHART ? found : 0;
+        if (paged && shown && own != page) {
+            write_page(to, work, "usemtl", own);
+            page = own;
+        }
+        write_face(to, m, i);
+    }
+}
+
+/* Writes the model's meshes in the world. `mtl`: name of the MTL file, or NULL. */
+static vsh_result write_obj(const vshi_lit_work *work, const char *mtl, FILE *to, vsh_error *error) {
+    VSHI_NUMBERS;
+    obj_mesh m = {.first_position = 1, .first_uv = 1, .first_normal = 1};
+    fprintf(to, "%s%s\n", FIRST_LINE, VSHI_VERSION);
+    for (size_t i = 0; i < work->options->attribute_count; ++i) {
+        const vsh_attribute *one = &work->options->attributes[i];
+        fprintf(to, "# %s: %s\n", one->name, one->value);
+    }
+    if (mtl != NULL) {
+        fprintf(to, "mtllib %s\n", mtl);
+    }
+    for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
+        if (vshi_job_advance(work->gltf.job, 1)) {
+            return vshi_job_fail_cancelled(work->gltf.job, error);
+        }
+        const uint32_t object = m.mesh.object;
+        open_mesh(work, i, &m);
+        write_names(to, &m.mesh, object != 0 && object == m.mesh.object, i);
+        write_vertices(to, &m);
+        write_faces(to, work, &m, mtl != NULL || work->page_count > 1);
+        m.first_position += m.mesh.vertex_count;
+        m.first_uv += m.uv_count;
+        m.first_normal += m.mesh.normals != NULL ? m.mesh.vertex_count : 0;
+    }
+    return VSH_OK;
+}
+
+static void write_material(FILE *to, const char *image) {
+    fprintf(to, "Ka 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\n");
+    if (image != NULL) {
+        fprintf(to, "map_Ka %s\nmap_Kd %s\n", image, image);
+    }
+}
+
+/* Writes the materials of an OBJ: a white one for each page, with the page's image. */
+static void write_mtl(const vshi_lit_work *work, const vshi_lit_besides *besides, FILE *to) {
+    fprintf(to, "%s%s\n", FIRST_LINE, VSHI_VERSION);
+    for (size_t page = 0; page < work->page_count; ++page) {
+        const char *image = NULL;
+        for (size_t i = 0; i < besides->count; ++i) { /* in the order of the images */
+            image = work->options->images[i].page == page ? besides->list[i].name : image;
+        }
+        write_page(to, work, "newmtl", page);
+        write_material(to, image);
+    }
+    bool unlit = false;
+    for (size_t i = 0; i < vsh_model_mesh_count(work->model) && !unlit; ++i) {
+        unlit = work->meshes[i].uvs == NULL && work->meshes[i].uv_set < 0;
+    }
+    if (unlit) {
+        fprintf(to, "newmtl unlit\n");
+        write_material(to, NULL);
+    }
+}
+
+/* Fails if the file exists and vdbshade did not write it. */
+static vsh_result check_mtl(const char *path, vsh_error *error) {
+    char begins[sizeof FIRST_LINE] = "";
+    FILE *file = fopen(path, "rb");
+    if (file == NULL) {
+        return VSH_OK;
+    }
+    const size_t count = fread(begins, 1, sizeof begins - 1, file);
+    fclose(file);
+    return count == 0 || strcmp(begins, FIRST_LINE) == 0
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_ARGUMENT,
+                           "%s: would be replaced, which vdbshade has not written: give the OBJ another name",
+                           path);
+}
+
+/* --- files */
+
+/* Finds the paths of all files, and checks that none of them may not be replaced. */
+static vsh_result name_files(writing *w, vsh_error *error) {
+    const size_t named = w->besides->count + (w->bin != NULL);
+    const vshi_array arrays[] = {VSHI_ARRAY(w->files, named + 1), VSHI_ARRAY(w->outputs, named + 1),
+                                 VSHI_ARRAY(w->paths, named + 1)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, w->work->output, error));
+    w->file_count = named + 1;
+    for (size_t i = 0; i < w->file_count; ++i) {
+        const char *name = i < w->besides->count ? w->besides->list[i].name : w->bin;
+        char *path =
+            i < named ? vshi_path_beside(w->work->output, name, strlen(name)) : strdup(w->work->output);
+        w->paths[i] = path;
+        w->outputs[i] = &w->files[i].output;
+        if (path == NULL) {
+            return vshi_lit_fail_memory(w->work, error);
+        }
+        VSHI_TRY(vshi_lit_check_replaced(w->work, path, error));
+        if (i == w->besides->count && i < named && vshi_lit_is_obj(w->work->output)) {
+            VSHI_TRY(check_mtl(path, error));
+        }
+    }
+    return VSH_OK;
+}
+
+static vsh_result write_content(const writing *w, size_t i, FILE *to, vsh_error *error) {
+    const bool obj = vshi_lit_is_obj(w->work->output);
+    if (i < w->besides->count) {
+        fwrite(w->besides->list[i].bytes, 1, w->besides->list[i].size, to);
+    } else if (i + 1 == w->file_count) {
+        return obj ? write_obj(w->work, w->bin, to, error) : write_document(w, w->bin == NULL, to, error);
+    } else if (obj) {
+        write_mtl(w->work, w->besides, to);
+    } else {
+        write_buffers(w, to);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *besides, vsh_error *error) {
+    writing w = {.work = work, .besides = besides};
+    const bool obj = vshi_lit_is_obj(work->output),
+               glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
+    vsh_result result;
+    if (!obj) {
+        VSHI_TRY_DONE(place_buffers(&w, error));
+    }
+    if (obj ? besides->count > 0 : !glb && w.size > 0) {
+        VSHI_TRY_DONE(vshi_lit_name_beside(work, "", obj ? "mtl" : "bin", &w.bin, error));
+    }
+    VSHI_TRY_DONE(name_files(&w, error)); /* needs the input's names of its buffers */
+    if (!obj) {
+        VSHI_TRY_DONE(join_buffers(&w, error));
+    }
+    for (size_t i = 0; i < w.file_count; ++i) {
+        vshi_lit_stream *file = &w.files[i];
+        VSHI_TRY_DONE(vshi_lit_begin_stream(file, w.paths[i], error));
+        VSHI_TRY_DONE(vshi_lit_end_stream(file, write_content(&w, i, file->to, error), error));
+    }
+    result = vshi_job_cancelled(work->gltf.job) ? vshi_job_fail_cancelled(work->gltf.job, error)
+                                                : vshi_outputs_commit(w.outputs, w.file_count, error);
+done:
+    for (size_t i = 0; i < w.file_count; ++i) {
+        vshi_output_abandon(&w.files[i].output);
+        free(w.paths[i]);
+    }
+    free(w.files);
+    free(w.bin);
+    free(w.offsets);
+    return result;
+}

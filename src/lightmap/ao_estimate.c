@@ -1,0 +1,345 @@
+/* Estimates AO of texels from their shots and their neighbours' shots. */
+#include "lightmap/page.h"
+
+#include "base/memory.h"
+#include "shade/ao.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Cells of a lattice that are estimated together, with the cells around that their windows reach. */
+enum { TILES = 8, INNER = TILES * VSHI_CELL, WIDTH = INNER + 2 * VSHI_CELL, TEXELS = WIDTH * WIDTH };
+_Static_assert((int)VSHI_WINDOW_REACH <= (int)VSHI_CELL, "windows reach the next tile, no farther");
+
+/* Sums over a row of cells: of squared errors and vshi_window_estimate's curved, in VSHI_SQUARE_UNIT. */
+typedef struct row_sum {
+    uint64_t square;
+    int64_t curved;
+    double worst;
+    uint64_t rays, refined, invalid;
+} row_sum;
+
+typedef struct estimating {
+    vshi_texel_map map;
+    const vshi_shots *shots;
+    const vsh_shade_options *shade;
+    float *values, *bent;
+    vshi_ao_plane *planes;
+    int32_t spacing; /* of the current lattice */
+    row_sum *sums;   /* [rows of cells] */
+} estimating;
+
+/* Some cells of a lattice and those around them, as one rectangle of its texels. */
+typedef struct block {
+    vshi_texel_lattice lattice;
+    size_t at[TEXELS]; /* places + 1 of texels that shot; 0: none */
+    vshi_window_texel texels[TEXELS];
+    vshi_window_sums sums[(WIDTH + 1) * (WIDTH + 1)];
+    vshi_windows windows;
+} block;
+
+/* --- estimates of texels that shot */
+
+static bool is_own(const estimating *s, size_t at) {
+    return at > 0 && s->shots->rays[at - 1] > 0 && s->shots->level[at - 1] == s->spacing;
+}
+
+/* Lists the texels of a block. False if none is to be estimated. */
+static bool find_texels(const estimating *s, block *b) {
+    bool any = false;
+    for (int32_t k = 0; k < TEXELS; ++k) {
+        const int32_t x = k % WIDTH, y = k / WIDTH;
+        b->at[k] = vshi_texel_at(&s->map, b->lattice.left + x * s->spacing, b->lattice.top + y * s->spacing);
+        any = any || (x >= VSHI_CELL && x < VSHI_CELL + INNER && y >= VSHI_CELL && y < VSHI_CELL + INNER &&
+                      is_own(s, b->at[k]));
+    }
+    return any;
+}
+
+static void lay_out(const estimating *s, block *b) {
+    const int32_t sampler = vshi_ao_tile_sampler(s->shade->sampler);
+    memset(b->texels, 0, sizeof b->texels);
+    b->windows = (vshi_windows){WIDTH, WIDTH, b->texels, b->sums};
+    int32_t rays = 0;
+    float spread = 0.0f;
+    for (size_t k = 0; k < TEXELS; ++k) {
+        const size_t i = b->at[k] - 1;
+        if (b->at[k] == 0 || s->shots->rays[i] == 0) {
+            b->at[k] = 0;
+            continue;
+        }
+        if (s->shots->rays[i] != rays) {
+            rays = s->shots->rays[i];
+            spread = (float)vshi_ao_shared_spread(sampler, rays);
+        }
+        b->texels[k].value = s->shots->share[i];
+        b->texels[k].rays = rays;
+        b->texels[k].spread = spread;
+    }
+    vshi_links_find(&s->map, &b->lattice, b->texels);
+    for (size_t k = 0; k < TEXELS; ++k) { /* a texel without rays cuts the links of its neighbours */
+        const bool none = b->at[k] == 0;
+        b->texels[k].left = b->texels[k].left && !none && b->at[k - 1] > 0;
+        b->texels[k].above = b->texels[k].above && !none && b->at[k - WIDTH] > 0;
+    }
+    vshi_windows_sum(&b->windows);
+}
+
+/* Bent normals turn with the surface, but windows are chosen by values, which may not change there. So the
+ * average is over the differences from each texel's normal. */
+static void bend(const estimating *s, const block *b, const vshi_window_estimate *e, int32_t x, int32_t y,
+                 float *bent) {
+    const float *own = s->map.normal + 3 * (b->at[y * WIDTH + x] - 1);
+    double sum[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        sum[axis] = VSHI_AO_OPEN * e->value * (double)own[axis];
+    }
+    for (int32_t row = e->y[0]; row <= e->y[1]; ++row) {
+        for (int32_t column = e->x[0]; column <= e->x[1]; ++column) {
+            const size_t i = b->at[row * WIDTH + column] - 1;
+            const float *open = s->shots->open + 3 * i, *normal = s->map.normal + 3 * i;
+            const double weight = vshi_window_weight(e, x, y, column, row);
+            const double even = VSHI_AO_OPEN * (double)s->shots->share[i];
+            for (size_t axis = 0; axis < 3; ++axis) {
+                sum[axis] += weight * ((double)open[axis] - even * (double)normal[axis]);
+            }
+        }
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+        bent[axis] = (float)sum[axis];
+    }
+}
+
+/* Estimates by windows across tiles. If these know too little for the texel's tile, by the tile's own
+ * windows. */
+static vshi_window_estimate estimate(const estimating *s, const block *b, int32_t x, int32_t y) {
+    const double max_error = s->shade->max_error;
+    const vshi_window_estimate e = vshi_windows_estimate(&b->windows, x, y, max_error, 0);
+    if (e.centred <= VSHI_AO_TILE_ENOUGH * max_error) {
+        return e;
+    }
+    const vshi_window_estimate own = vshi_windows_estimate(&b->windows, x, y, max_error, VSHI_CELL);
+    return own.centred < e.centred ? own : e;
+}
+
+static void estimate_own(const estimating *s, const block *b) {
+    const float part = 1.0f / (float)s->spacing;
+    for (int32_t y = VSHI_CELL; y < VSHI_CELL + INNER; ++y) {
+        for (int32_t x = VSHI_CELL; x < VSHI_CELL + INNER; ++x) {
+            const size_t at = b->at[y * WIDTH + x];
+            if (!is_own(s, at)) {
+                continue;
+            }
+            const size_t i = at - 1;
+            const vshi_window_estimate e = estimate(s, b, x, y);
+            s->values[i] = (float)e.value;
+            s->planes[i] = (vshi_ao_plane){
+                {part * (float)e.slope[0], part * (float)e.slope[1]}, (float)e.deviation, (float)e.curved};
+            if (s->bent != NULL) {
+                bend(s, b, &e, x, y, s->bent + 3 * i);
+            }
+        }
+    }
+}
+
+static size_t blocks_across(int32_t texels, int32_t spacing) {
+    const int32_t side = INNER * spacing;
+    return (size_t)((texels + side - 1) / side);
+}
+
+/* Blocks are numbered row by row. */
+static vsh_result estimate_block(void *user, size_t number, vsh_error *error) {
+    const estimating *s = user;
+    const size_t columns = blocks_across(s->map.width, s->spacing);
+    const int32_t side = INNER * s->spacing, beside = VSHI_CELL * s->spacing;
+    block *b = malloc(sizeof *b);
+    if (b == NULL) {
+        return vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory");
+    }
+    b->lattice = (vshi_texel_lattice){(int32_t)(number % columns) * side - beside,
+                                      (int32_t)(number / columns) * side - beside, s->spacing, WIDTH, WIDTH};
+    if (find_texels(s, b)) {
+        lay_out(s, b);
+        estimate_own(s, b);
+    }
+    free(b);
+    return VSH_OK;
+}
+
+/* --- of those between */
+
+/* A cell whose texels are estimated by the windows of its corners. */
+typedef struct cell {
+    int32_t at[2];
+    uint32_t good;    /* corners that belong to the lattice, as bits */
+    size_t corner[4]; /* origins */
+    bool whole;
+} cell;
+
+static void read_corners(const estimating *s, cell *c) {
+    c->good = 0;
+    for (int32_t k = 0; k < 4; ++k) {
+        const size_t at =
+            vshi_texel_at(&s->map, c->at[0] + (k & 1) * s->spacing, c->at[1] + (k >> 1) * s->spacing);
+        c->corner[k] = at - 1;
+        if (at > 0 && s->shots->rays[at - 1] > 0 && s->shots->level[at - 1] >= s->spacing) {
+            c->good |= 1u << k;
+        }
+    }
+    c->whole = vshi_links_whole(&s->map, c->at[0], c->at[1], s->spacing);
+}
+
+/* The place of a texel between its cell's corners, 0 … 1, but never on a corner's line. */
+static double part_of(int32_t place, int32_t spacing) {
+    return (place + 0.25) / (spacing + 0.5);
+}
+
+/* Blends the planes of the corners. */
+static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t dy, size_t i) {
+    const uint32_t corners =
+        c->good & vshi_ao_corners(&s->map, c->at, s->spacing, c->whole, c->at[0] + dx, c->at[1] + dy);
+    const double u = part_of(dx, s->spacing), v = part_of(dy, s->spacing);
+    double sum = 0.0, value = 0.0, deviation = 0.0, curved = 0.0, bent[3] = {0.0, 0.0, 0.0};
+    for (int32_t k = 0; k < 4; ++k) {
+        if ((corners >> k & 1) == 0) {
+            continue;
+        }
+        const size_t corner = c->corner[k];
+        const vshi_ao_plane *p = &s->planes[corner];
+        const double weight = (k & 1 ? u : 1.0 - u) * (k >> 1 ? v : 1.0 - v);
+        const int32_t x = dx - (k & 1) * s->spacing, y = dy - (k >> 1) * s->spacing;
+        const double at = (double)s->values[corner] + (double)p->slope[0] * x + (double)p->slope[1] * y;
+        sum += weight;
+        value += weight * (at < 0.0 ? 0.0 : at > 1.0 ? 1.0 : at);
+        deviation += weight * (double)p->deviation;
+        curved += weight * (double)p->curved;
+        for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
+            bent[axis] +=
+                weight * ((double)s->bent[3 * corner + axis] - VSHI_AO_OPEN * (double)s->values[corner] *
+                                                                   (double)s->map.normal[3 * corner + axis]);
+        }
+    }
+    if (!(sum > 0.0)) { /* a damaged part of a bake */
+        s->values[i] = 0.0f;
+        return;
+    }
+    s->values[i] = (float)(value / sum);
+    s->planes[i] = (vshi_ao_plane){{0.0f, 0.0f}, (float)(deviation / sum), (float)(curved / sum)};
+    for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
+        s->bent[3 * i + axis] =
+            (float)(VSHI_AO_OPEN * (double)s->values[i] * (double)s->map.normal[3 * i + axis] +
+                    bent[axis] / sum);
+    }
+}
+
+/* Fills the texels between of a row of cells. A vshi_element_fn. */
+static vsh_result fill_row(void *user, size_t number, vsh_error *error) {
+    const estimating *s = user;
+    const int32_t row = (int32_t)number * s->spacing, bottom = row + s->spacing;
+    (void)error;
+    for (int32_t column = 0; column < s->map.width; column += s->spacing) {
+        cell c = {.at = {column, row}};
+        bool read = false;
+        for (int32_t y = row; y < bottom && y < s->map.height; ++y) {
+            for (int32_t x = column; x < column + s->spacing && x < s->map.width; ++x) {
+                const size_t i = (size_t)y * (size_t)s->map.width + (size_t)x;
+                if (s->shots->level[i] != s->spacing || s->shots->rays[i] > 0) {
+                    continue;
+                }
+                if (!read) {
+                    read_corners(s, &c);
+                    read = true;
+                }
+                fill_texel(s, &c, x - column, y - row, i);
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* --- all */
+
+/* Sums a row of cells for the statistics. A vshi_element_fn. */
+static vsh_result sum_row(void *user, size_t row, vsh_error *error) {
+    const estimating *s = user;
+    row_sum *sum = &s->sums[row];
+    const size_t width = (size_t)s->map.width, end = (row + 1) * VSHI_CELL * width;
+    const size_t all = width * (size_t)s->map.height;
+    (void)error;
+    for (size_t i = row * VSHI_CELL * width; i < end && i < all; ++i) {
+        if (s->shots->level[i] == VSHI_AO_KNOWN_LEVEL) {
+            const float value = s->shots->share[i];
+            s->values[i] = value;
+            s->planes[i] = (vshi_ao_plane){.deviation = isnan(value) ? NAN : 0.0f};
+            for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
+                s->bent[3 * i + axis] = s->shots->open[3 * i + axis];
+            }
+            sum->invalid += isnan(value);
+        } else if (s->shots->level[i] != 0) {
+            const double deviation = (double)s->planes[i].deviation;
+            sum->square += (uint64_t)(deviation * deviation / VSHI_SQUARE_UNIT);
+            sum->curved += (int64_t)((double)s->planes[i].curved / VSHI_SQUARE_UNIT);
+            sum->worst = fmax(sum->worst, deviation);
+            sum->rays += (uint64_t)s->shots->rays[i];
+            ++sum->refined;
+        }
+    }
+    return VSH_OK;
+}
+
+/* Sums curvature by rows of cells: for single texels it is too noisy to differ from zero. */
+static void add_sums(const estimating *s, size_t rows, vsh_shade_stats *stats) {
+    double square = 0.0;
+    for (size_t row = 0; row < rows; ++row) {
+        const row_sum *sum = &s->sums[row];
+        square += (double)sum->square * VSHI_SQUARE_UNIT;
+        square += sum->curved > 0 ? (double)sum->curved * VSHI_SQUARE_UNIT : 0.0;
+        stats->worst_error = fmax(stats->worst_error, sum->worst);
+        stats->rays += sum->rays;
+        stats->refined += sum->refined;
+        stats->invalid += sum->invalid;
+    }
+    stats->square_error += square;
+    stats->ao_square_error += square;
+}
+
+static vsh_result run_estimate(estimating *s, int32_t spacing, vshi_job *job, vsh_error *error) {
+    const int32_t width = s->map.width, height = s->map.height;
+    for (s->spacing = spacing; s->spacing > 0; s->spacing /= 2) {
+        const size_t blocks = blocks_across(width, s->spacing) * blocks_across(height, s->spacing);
+        VSHI_TRY(vshi_parallel_each(job, blocks, 1, 0, estimate_block, s, error));
+    }
+    for (s->spacing = spacing; s->spacing > 1; s->spacing /= 2) {
+        const size_t cells = (size_t)((height + s->spacing - 1) / s->spacing);
+        VSHI_TRY(vshi_parallel_each(job, cells, 1, 0, fill_row, s, error));
+    }
+    const size_t rows = ((size_t)height + VSHI_CELL - 1) / VSHI_CELL;
+    return vshi_parallel_each(job, rows, 1, 1, sum_row, s, error);
+}
+
+vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, float *values,
+                            vshi_ao_plane *planes, float *bent, const vsh_run *run, vsh_shade_stats *stats,
+                            vsh_error *error) {
+    const size_t rows = (page->height + VSHI_CELL - 1) / VSHI_CELL;
+    estimating s = {.map = {.width = (int32_t)page->width,
+                            .height = (int32_t)page->height,
+                            .level = shots->level,
+                            .position = page->position,
+                            .normal = page->normal},
+                    .shots = shots,
+                    .shade = &page->shade,
+                    .values = values,
+                    .planes = planes,
+                    .bent = bent};
+    vshi_job *job;
+    VSHI_TRY(vshi_begin_stage(run, "ao", rows, &job, error));
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.sums, rows, sizeof *s.sums, "AO texels", error));
+    VSHI_TRY_DONE(run_estimate(&s, page->charts->ao_spacing, job, error));
+    add_sums(&s, rows, stats);
+done:
+    free(s.sums);
+    vshi_job_end(job);
+    return result;
+}

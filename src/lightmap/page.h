@@ -1,0 +1,203 @@
+/* A lightmap under way: its planes, the results of its tiles, and the passes over the whole page. */
+#pragma once
+
+#include "lightmap/origins.h"
+#include "lightmap/padding.h"
+#include "lightmap/texels.h"
+#include "shade/window.h"
+#include "trace/trace.h"
+
+#include <vdbshade/lightmap.h>
+
+/* --- pages (page.c) */
+
+/* Rays to the casters from a texel whose value is not known yet. */
+typedef struct vshi_held_texel {
+    uint32_t texel; /* vsh_texel() */
+    uint32_t weight;
+    uint16_t free[2]; /* free rays of each of two sets */
+    int16_t even;     /* VSHI_TRUTH_… */
+    int16_t zero;     /* padding: parts of bakes store the struct as it is */
+} vshi_held_texel;
+
+/* Texels of a tile to compare with the casters once their values are known. */
+typedef struct vshi_held_texels {
+    vshi_held_texel *list; /* [count], or NULL */
+    size_t count;
+} vshi_held_texels;
+
+/* Results of the AO or sky rays that texels share. */
+typedef struct vshi_shots {
+    float *share;           /* [height][width]: free share of a texel's own rays; NULL: nothing is shared */
+    int32_t *rays;          /* [height][width] */
+    uint8_t *level;         /* [height][width]: vshi_ao_share's; 0: there is no valid texel */
+    float *open;            /* [height][width][3]: their bent, as in vshi_ao_task; NULL: not wanted */
+    vshi_held_texels *held; /* [tiles] */
+} vshi_shots;
+
+typedef struct vshi_page {
+    const vsh_charts *charts;
+    vsh_lightmap lightmap; /* planes of the caller */
+    size_t light_count;
+    vsh_shade_options shade; /* resolved */
+    vshi_store *store;
+    size_t width, height;
+    uint8_t *state;  /* [height][width]: VSHI_TEXEL_… */
+    uint32_t *mesh;  /* [height][width]: of a texel's first sample, + 1; 0: none */
+    float *position; /* [height][width][3]: of texels that share AO, from charts->centre */
+    float *normal;   /* [height][width][3]: of texels that share AO */
+    float *tangent;  /* [height][width][4]: of texels that share AO; NULL: not wanted */
+    vshi_shots ao, sky;
+    vsh_shade_stats *stats; /* [tiles] */
+    vsh_bake_error *errors; /* [tiles][error_count]: of lights, AO, the sky */
+    size_t error_count;
+} vshi_page;
+
+/* Allocates a page with these planes, zeroed. `shared`: texels share rays of AO. Close it also after an
+ * error, before the store, which holds its arrays. Errors: as vshi_store_take(). */
+vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap, size_t light_count,
+                          const vsh_shade_options *shade, bool shared, vshi_store *store, vshi_page *page,
+                          vsh_error *error);
+void vshi_page_close(vshi_page *page);
+
+/* Frees the arrays that only vshi_page_finish() needs. */
+void vshi_page_close_shots(vshi_page *page);
+
+/* The most bytes of a page: its planes and the memory for baking them. */
+double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes, size_t light_count,
+                           bool shared);
+
+/* Whether texels share rays of AO: with methods that keep an error, unless layers take part. */
+bool vshi_ao_is_shared(const vsh_shade_options *shade, int32_t spacing, bool layered_ao);
+
+static inline size_t vshi_page_texels(const vshi_page *page) {
+    return page->width * page->height;
+}
+
+/* The place of a sample's texel in the page. */
+static inline size_t vshi_page_place(const vshi_page *page, uint32_t texel) {
+    return vsh_texel_place(texel, (int32_t)page->width);
+}
+
+/* Stores the place, normal and tangent of a sample for its texel. */
+void vshi_page_note(vshi_page *page, const vshi_samples *samples, size_t i);
+
+/* Rasterizes a tile that another process traced, for the finish: meshes, and for shared AO places and
+ * normals. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_page_rasterize(vshi_page *page, size_t tile, vsh_error *error);
+
+/* Finishes a page whose tiles are all traced: estimates shared AO, adds up irradiance, fills invalid texels,
+ * pads. Adds to *stats. Errors: as vshi_store_take(); VSH_ERROR_CANCELLED. */
+vsh_result vshi_page_finish(vshi_page *page, const vsh_run *run, vsh_bake_stats *stats, vsh_error *error);
+
+/* Checks the lights, and the members of a lightmap, for charts. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_lightmap_check(const vsh_lightmap *lightmap, const vsh_charts *charts,
+                               const vsh_light *lights, size_t light_count, vsh_error *error);
+
+/* vsh_lightmap_fill_hidden() with memory of a store. */
+vsh_result vshi_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap *lightmap,
+                                     size_t light_count, vshi_store *store, const vsh_run *run,
+                                     uint64_t *filled, vsh_error *error);
+
+/* Adds the errors of tiles, or of lightmaps. */
+void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more);
+
+/* Turns a mean of open directions, as in vshi_ao_task, into a unit bent normal: in the tangent space of a
+ * tangent [4], or (NULL) in world space. */
+void vshi_bent_normal(const float *normal, const float *tangent, float *bent);
+
+/* Makes a mean of bent normals a unit vector. */
+void vshi_bent_normalize(float *bent);
+
+/* --- tracing tiles (trace.c) */
+
+/* Shared by all tiles of a bake. */
+typedef struct vshi_tracer vshi_tracer;
+
+/* Prepares the shading of pages with these planes, of which only NULL or not counts, and their options. The
+ * other arguments must outlive it. Errors: as vsh_bake_lightmap(). */
+vsh_result vshi_tracer_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
+                              const vsh_shade_options *shade, const vsh_lightmap *planes, bool held,
+                              const vsh_run *run, vshi_tracer **tracer, vsh_error *error);
+void vshi_tracer_free(vshi_tracer *tracer);
+
+/* Whether texels of charts with this spacing share rays. */
+bool vshi_tracer_shares(const vshi_tracer *tracer, int32_t spacing);
+
+/* The most bytes of tiles at work on `threads` threads (0: all cores). */
+double vshi_trace_bytes(const vsh_charts *charts, int32_t threads);
+
+/* Traces tiles, tiles[count] or (NULL) the first `count`. Each depends only on the scene and its own
+ * geometry. `job` counts them. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED, VSH_ERROR_INTERNAL. */
+vsh_result vshi_trace_tiles(const vshi_tracer *tracer, vshi_page *page, const uint32_t *tiles, size_t count,
+                            vshi_job *job, vsh_error *error);
+
+/* --- AO of texels that share rays, estimated from their own rays and their neighbours' (ao_estimate.c) */
+
+/* The plane of a texel's window (slopes for each texel of the page), and its error. */
+typedef struct vshi_ao_plane {
+    float slope[2], deviation, curved;
+} vshi_ao_plane;
+
+/* Sets values and planes [height][width] of all texels with a level, and unless NULL bent [height][width][3],
+ * the mean of their open directions. Adds to *stats. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, float *values,
+                            vshi_ao_plane *planes, float *bent, const vsh_run *run, vsh_shade_stats *stats,
+                            vsh_error *error);
+
+/* --- errors of values against the casters, measured on some samples (field_error.c) */
+
+/* One channel: a light, or (NULL) AO, or with options->ao_up the sky: the free upper directions, as a share
+ * of the whole hemisphere. */
+typedef struct vshi_truth_channel {
+    vshi_truth truth;
+    vshi_lifter lifter;
+    vshi_vec up;
+    vshi_sampler *sampler;
+} vshi_truth_channel;
+
+/* Compares one of every `step` samples in a row, chosen by a hash, with the casters. */
+typedef struct vshi_field_error {
+    const vsh_occluders *occluders;
+    vshi_truth truth; /* without the members of single channels */
+    bool traced;      /* all values come from rays to the casters, which also decided validity */
+    size_t step;
+    vshi_truth_channel *channels; /* [light_count + 2]: lights, AO, the sky; NULL: nothing is compared */
+} vshi_field_error;
+
+/* Prepares it for a lightmap with `samples` samples, without channels. */
+vshi_field_error vshi_field_error_open(const vsh_occluders *occluders, const vsh_shade_options *shade,
+                                       uint64_t samples, bool traced);
+
+/* Close the channel also after an error. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_truth_channel_open(const vshi_field_error *of, const vsh_light *light,
+                                   const vsh_shade_options *options, vshi_truth_channel *channel,
+                                   vsh_error *error);
+void vshi_truth_channel_close(vshi_truth_channel *channel);
+
+/* A sample of a tile to compare with the casters. */
+typedef struct vshi_held_sample {
+    uint32_t sample, origin; /* its number among the samples, among the origins */
+    uint32_t weight;         /* number of samples that it represents */
+} vshi_held_sample;
+
+/* Chooses samples of a tile that are valid for the casters too; returns how many. `held` has room for one of
+ * every `step`. */
+size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *samples,
+                               const vshi_origins *origins, vshi_held_sample *held);
+
+/* Adds the errors of a channel's values [origins]. */
+void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
+                          const vshi_held_sample *held, size_t count, const float *values,
+                          vsh_bake_error *sum);
+
+/* Counts the free rays of a channel; returns the number of texels. */
+size_t vshi_field_error_count(const vshi_truth_channel *channel, const vshi_samples *samples,
+                              const vshi_held_sample *held, size_t count, vshi_held_texel *texels);
+
+/* Adds the error of a texel, once its value is known. */
+void vshi_field_error_settle(const vshi_held_texel *texel, double max_error, float value,
+                             vsh_bake_error *sum);
+
+/* The most rays behind each of a sample's two values. */
+int32_t vshi_field_error_rays(double max_error);

@@ -1,0 +1,69 @@
+/* Borders between charts on a smooth surface, and the texels that bilinear lookups read along them. */
+#pragma once
+
+#include "lightmap/texels.h"
+
+/* The lightmaps that are stitched together. Triangles and texels are numbered through all of them. */
+typedef struct vshi_seam_pages {
+    const vshi_charts **charts; /* [count] */
+    size_t count;
+    size_t *first;   /* [count + 1]: each page's first triangle */
+    uint64_t *texel; /* [count + 1]: and its first texel */
+} vshi_seam_pages;
+
+/* An edge where two triangles join in the world, but not in the lightmap. */
+typedef struct vshi_seam {
+    double x[2][2], y[2][2]; /* [side][end], texels; an end of both sides is one place in the world */
+    uint32_t chart[2];       /* of each side */
+    uint32_t page[2];
+} vshi_seam;
+
+typedef struct vshi_seams {
+    uint32_t *chart; /* [triangles of all pages]: one number for all triangles of a chart */
+    vshi_seam *list; /* [count] */
+    size_t count;
+    double bytes;
+} vshi_seams;
+
+/* Finds charts and seams. A chart is a set of triangles that share edges in the world and in the lightmap. A
+ * seam is an edge between two charts, or within one, with equal ends in the world. At both ends the sides'
+ * normals differ by at most an angle with this cosine. Of edges with many triangles only some pairs count.
+ * Errors: VSH_ERROR_LIMIT (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED.
+ * Free with vshi_seams_free(), also after an error. */
+vsh_result vshi_seams_find(const vshi_seam_pages *pages, double cosine, const vsh_run *run, vshi_job *job,
+                           vshi_seams *seams, vsh_error *error);
+void vshi_seams_free(vshi_seams *seams);
+
+enum { VSHI_SEAM_READS = 8 }; /* texels: four on each side */
+
+/* A place on a seam. Σ weight × texel is the difference between the bilinear lookups on both sides. Weights
+ * are multiples of 2^-24 with the sum 0, so equal texels give exactly 0. `share` weighs the squared
+ * difference by its length of border, in half texels, so that short edges count like long ones. */
+typedef struct vshi_seam_row {
+    uint32_t unknown[VSHI_SEAM_READS];
+    float weight[VSHI_SEAM_READS];
+    float share;
+} vshi_seam_row;
+
+/* An island's unknowns in one channel: the changes of texels that minimise the differences at seams. */
+typedef struct vshi_seam_problem {
+    const vshi_seam_row *rows;
+    size_t row_count, unknown_count;
+    uint32_t first;         /* number of its first unknown in the rows */
+    const double *low;      /* [unknown_count]: ≤ 0, the least change of each */
+    const double *high;     /* ≥ 0 */
+    const double *keep;     /* > 0: the cost of a squared change */
+    const double *gradient; /* at no change */
+    double *change;         /* found */
+    double *work;           /* [VSHI_SEAM_WORK × unknown_count] */
+    vshi_job *job;          /* checked for cancelling */
+} vshi_seam_problem;
+
+enum { VSHI_SEAM_WORK = 2 }; /* vectors */
+
+/* Computes the gradient of ½ Σ share (row · values)². */
+void vshi_seam_gradient(const vshi_seam_problem *problem, const double *values, double *gradient);
+
+/* Minimises ½ Σ share (row · (value + change))² + ½ Σ keep change² within low … high. All machines give the
+ * same bits. Returns the number of steps. */
+int vshi_seam_solve(vshi_seam_problem *problem);
