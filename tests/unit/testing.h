@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include <vdbshade/vdbshade.h>
 
 VSH_BEGIN_C
 #include <cmocka.h>
@@ -21,8 +22,6 @@ VSH_BEGIN_C
 /* Runs what the program lists; main.c calls it. */
 __attribute__((weak)) int run_listed_tests(void);
 VSH_END_C
-
-#include <vdbshade/vdbshade.h>
 
 #ifndef __cplusplus
 #include "base/job.h"
