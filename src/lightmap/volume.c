@@ -78,7 +78,8 @@ static void sample_solid(const volume_bake *bake, size_t count, const double *po
     for (size_t i = 0; i < count; ++i) {
         distances[i] = sample_field(o->field, positions + 3 * i);
     }
-    for (const vshi_layer *layer = o->layers; layer < o->layers + o->layer_count; ++layer) {
+    for (size_t k = 0; k < o->layer_count; ++k) {
+        const vshi_layer *layer = &o->layers[k];
         for (size_t i = 0; i < count && layer->heights == NULL; ++i) {
             /* the field of spheres, for rays of AO, may have no distances */
             const double *at = positions + 3 * i;
