@@ -1,4 +1,4 @@
-/* What tools/judge-assets asks: the truth of a model's lightmap, and what a bake is off by. Reading models
+/* Judges a model's lightmap for bench/assets.py: the truth, and the error of a bake. Reading models
  * and images is the library's, all else is of its own: texels, solids, rays. */
 #pragma once
 

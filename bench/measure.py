@@ -1,6 +1,6 @@
-"""Measures what needs no C: parts of `tools/bench`, by the Python module. Usage: measure.py PART FILE.csv
+"""The parts of `tools/bench` that need only the Python module. Usage: measure.py PART FILE.csv
 
-Seconds are of the processor, of one thread, so that other work on the machine counts little."""
+Seconds are processor seconds of one thread, so other work on the machine matters little."""
 import csv
 import ctypes
 import math

@@ -1,14 +1,13 @@
 #!/usr/bin/env bash
-# Every symbol of the public headers is documented, by Doxygen, and has its place on a page. Usage: api.sh DOXYFILE
+# Doxygen finds a comment for every symbol of the public headers and puts it on a page. Usage: api.sh DOXYFILE
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 doxyfile=${1:?usage: api.sh DOXYFILE}
-command -v doxygen >/dev/null || { echo "api: skipped: no doxygen" && exit 77; }
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# pages FOLDER: makes them of the headers there; fails where one is not documented.
+# pages FOLDER: documents the headers of FOLDER; fails if a comment is missing
 pages() {
     rm -rf "$work/pages"
     mkdir "$work/pages"
@@ -17,7 +16,7 @@ pages() {
 }
 pages "$root/include/vdbshade" || { cat "$work/log" && exit 1; }
 
-# functions and constants (of enums without names, of which Doxygen does not ask for a comment) are there
+# Doxygen asks for no comments in unnamed enums, so look for functions and constants.
 names=$(gcc -E -P -I"$root/include" -x c - <<<'#include <vdbshade/vdbshade.h>' |
     grep -oE '\b(vsh_[a-z0-9_]+\(|VSH_[A-Z0-9_]+ = )' | tr -d '( =' | sort -u)
 [ "$(wc -l <<<"$names")" -gt 300 ]
@@ -25,7 +24,7 @@ cat "$work"/pages/html/*_8h.html >"$work/all"
 missing=$(while read -r name; do grep -q ">$name *<" "$work/all" || echo "$name"; done <<<"$names")
 [ -z "$missing" ] || { echo "api: on no page:" $missing && exit 1; }
 
-# what is not documented is noticed: a function, a struct, members, a macro
+# Missing comments of a function, a struct, members and a macro are noticed.
 noticed() { # FILE SED WORD
     rm -rf "$work/headers"
     cp -r "$root/include/vdbshade" "$work/headers"

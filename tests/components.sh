@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Each file that is installed belongs to one component that a package is made of (tools/package). Usage: components.sh BUILD_FOLDER
+# Each installed file belongs to one component, of which tools/package makes packages. Usage: components.sh BUILD_FOLDER
 set -euo pipefail
 
 build=${1:?usage: components.sh BUILD_FOLDER}
@@ -14,9 +14,9 @@ installed whole | sort >"$work/whole.txt"
 for component in library development program documentation python; do
     installed "$component" --component "$component"
 done | sort >"$work/components.txt"
-diff "$work/whole.txt" "$work/components.txt" || { echo "components: of none (<) or of several (>)" && exit 1; }
+diff "$work/whole.txt" "$work/components.txt" || { echo "components: files in no component (<) or in several (>)" && exit 1; }
 
-has() { # COMPONENT FILE …: it has them, and no other has
+has() { # COMPONENT FILE …
     local file
     for file in "${@:2}"; do
         [ -n "$(find "$work/$1" -path "$work/$1/$file" -print -quit)" ] || { echo "components: $1 has no $file" && exit 1; }
@@ -26,4 +26,4 @@ has library '*/libvdbshade.so.*' '*/vdbshade/libvdbshade_openvdb.so.*' '*/vdbsha
 has development '*/libvdbshade.so' '*/libvdbshade.a' include/vdbshade/vdbshade.h '*/vdbshade.pc' '*/vdbshade-config.cmake'
 has program bin/vdbshade share/man/man1/vdbshade.1 share/man/man1/vdbshade-bake.1
 has documentation share/doc/vdbshade/docs/scene.md share/doc/vdbshade/examples/points.c
-echo "components: $(wc -l <"$work/whole.txt") files, each of one"
+echo "components: $(wc -l <"$work/whole.txt") files, each in one"

@@ -1,19 +1,19 @@
 #!/usr/bin/env bash
-# tools/includes: the order holds, and what would break it is found. Usage: includes.sh
+# Rooms include only rooms below them, and tools/includes finds violations. Usage: includes.sh
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 includes=$here/../tools/includes
 "$includes"
 
-# docs/architecture.md says the same.
+# docs/architecture.md lists the same order.
 while read -r room _ rooms; do
     rooms=${rooms// /, }
     grep -q "^| $room | .* | $rooms |\$" "$here/../docs/architecture.md" ||
         { echo "docs/architecture.md: room $room: expected '$rooms' in the last column" && exit 1; }
 done < <(grep -E '^[a-z_]+ -> ' "$here/../tools/includes.txt")
 
-# A small tree, in which each of these is wrong in turn.
+# A small tree, with one violation at a time.
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$work"/{src/low,src/high,include/api,tools}
@@ -44,4 +44,4 @@ make && printf 'low -> high\n' >>"$work/tools/includes.txt"
 expect 1 "low -> high: not a room that is declared above it"
 make && mkdir "$work/src/new" && printf '#include "low/low.h"\n' >"$work/src/new/new.c"
 expect 1 "src/new/new.c: in no room"
-echo "includes: what breaks the order is found"
+echo "includes: violations are found"

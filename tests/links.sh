@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What the documents point at is there: files and headings that they link to, and every path of the project that they
-# name in backquotes. Usage: links.sh
+# Every file and heading that the documents link to exists, and every path of the project that they name in backquotes.
+# Usage: links.sh
 set -euo pipefail
 
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -8,7 +8,7 @@ export LC_ALL=C.UTF-8
 files=(*.md docs/*.md assets/README.md bench/README.md)
 bad=0 links=0 paths=0
 
-# The anchors of a file's headings, one a line.
+# anchors FILE: prints the anchors of its headings
 anchors() {
     sed -nE 's/^#+ +//p' "$1" | sed -E 's/`//g; s/\[([^]]*)\]\([^)]*\)/\1/g; s/[^[:alnum:] _-]//g; s/ /-/g' | tr '[:upper:]' '[:lower:]'
 }

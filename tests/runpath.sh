@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Where the programs and libraries of a folder look for their libraries: never in the current folder, which is what an
-# empty entry of a RUNPATH, or a relative one, means to the loader. Usage: runpath.sh FOLDER …
+# No program or library has an empty or relative entry in its RUNPATH, which would make the loader search the current folder.
+# Usage: runpath.sh FOLDER …
 set -euo pipefail
 
 count=0 bad=0
@@ -9,7 +9,7 @@ while IFS= read -r -d '' file; do
     dynamic=$(readelf -d "$file" 2>/dev/null) || true
     count=$((count + 1))
     while IFS= read -r path; do
-        IFS=: read -ra entries <<<"$path:end" # a last empty entry would be dropped
+        IFS=: read -ra entries <<<"$path:end" # keeps a trailing empty entry
         for entry in "${entries[@]:0:${#entries[@]}-1}"; do
             case $entry in
             /* | '$ORIGIN' | '$ORIGIN'/*) ;;

@@ -129,7 +129,7 @@ block() {
         fail "vdbshade.h"
 }
 
-# missing [TAG…]: what tools/setup asks for on a system where nothing is installed.
+# missing [PURPOSE]: what tools/setup asks for on a system where nothing is installed.
 missing() {
     mkdir -p stubs
     printf '#!/bin/sh\nexit 1\n' | tee stubs/dpkg-query >stubs/sudo
@@ -138,20 +138,26 @@ missing() {
     run env PATH="$PWD/stubs:$PATH" "$BATS_TEST_DIRNAME/../../tools/setup" "$@"
 }
 
-@test "the demo installs what building and baking take, and nothing of Python or tests" {
+@test "the demo installs what building and baking need; only the thorough tests need browsers, Slurm and clang-tidy" {
     local tools=$BATS_TEST_DIRNAME/../../tools package
-    grep -qx 'tools/setup' "$tools/demo" || fail "tools/demo has another set-up"
-    grep -qx 'tools/setup python test' "$tools/test" || fail "tools/test has another set-up"
-    missing
+    grep -qx 'tools/setup run' "$tools/demo" || fail "tools/demo has another set-up"
+    missing run
     [ "$status" -eq 2 ] || fail "expected exit code 2"
     [[ $output == *" cmake "*" libopenvdb-dev "* ]] || fail "what building takes is missing"
     for package in slurmd chromium doxygen clang-tidy lintian bats libcmocka-dev python3-numpy gcovr; do
         [[ " $output " != *" $package "* ]] || fail "$package is installed"
     done
-    missing python test
-    for package in cmake slurmd chromium bats libcmocka-dev python3-numpy; do
+    missing test
+    for package in cmake bats libcmocka-dev python3-numpy; do
         [[ " $output " == *" $package "* ]] || fail "$package is not installed"
     done
-    missing pyton
-    [[ $status -eq 2 && $output == *"no tag 'pyton'"* ]] || fail "a wrong tag is taken"
+    for package in slurmd chromium doxygen clang-tidy lintian gcovr; do
+        [[ " $output " != *" $package "* ]] || fail "$package is installed for the quick tests"
+    done
+    missing all
+    for package in cmake bats slurmd chromium doxygen clang-tidy lintian gcovr; do
+        [[ " $output " == *" $package "* ]] || fail "$package is not installed"
+    done
+    missing tests
+    [[ $status -eq 2 && $output == *"unknown purpose 'tests'"* ]] || fail "a wrong purpose is taken"
 }

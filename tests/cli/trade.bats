@@ -26,7 +26,7 @@ column() {
     done
     column resolution | grep -qx 12 && column resolution | grep -qx 24
     ! grep -qE 'nan|inf' trade.csv || fail "a number is none"
-    # the plot can be cut out as a file, as tools/curves does
+    # the plot can be cut out as a file, as `tools/bench curves` does
     sed -n '/<svg/,/<\/svg>/p;/<\/svg>/q' trade.html >plot.svg
     head -1 plot.svg | grep -q '^<svg .*xmlns="http://www.w3.org/2000/svg"' || fail "$(head -1 plot.svg)"
     [ "$(grep -c '</svg>' plot.svg)" -eq 1 ] || fail "no end"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Installs a build to a temporary prefix, moves that prefix, and uses the package there as a stranger would:
-# through CMake, through pkg-config, and from C++. Usage: run.sh BUILD_FOLDER
+# Installs a build to a temporary prefix, moves the prefix, and uses the package there: through CMake, through pkg-config, and
+# from C++. Usage: run.sh BUILD_FOLDER
 set -euo pipefail
 
 build=$(cd "${1:?usage: run.sh BUILD_FOLDER}" && pwd)

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Bakes game assets with nothing said, and judges the bakes against rays: how far real assets bake right.
+"""Bakes game assets with default options and judges the bakes against rays.
 
-    tools/judge-assets FOLDER [--program vdbshade] [--options "--method cone --ao-method cones"] [--run NAME]
+    tools/bench assets FOLDER [--program vdbshade] [--options "--method cone --ao-method cones"] [--run NAME]
                        [--formats glb,obj,fbx] [--rays 256] [--size 1024] [--seen-only] [--compare] [NAME…]
 
-FOLDER/assets holds the assets (tools/make_game_assets.py makes them there when it is empty), FOLDER/truth their
-truth, kept from run to run, and FOLDER/NAME bakes, pictures, judged.csv, table.md and sheet.png of the run. All
-formats are held against the truth of the GLB. --compare also runs `vdbshade compare` against --max-error 0.002.
+FOLDER/assets holds the assets (tools/modelling/make_game_assets.py makes them if there are none). FOLDER/truth keeps their
+truth from run to run. FOLDER/NAME gets bakes, pictures, judged.csv, table.md and sheet.png of the run. Every
+format is compared with the truth of the GLB. --compare also runs `vdbshade compare` against --max-error 0.002.
 
 The "seen" columns compare bilinear lookups with rays at random points of the surface (bench/judge_seen.c), for a sun
 of 20°, GLBs and their smooth-shaded versions. Shares are in percent of the points. --seen-only makes these alone.
@@ -23,19 +23,19 @@ from glob import glob
 import numpy
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-BUILD = os.environ.get("BUILD", os.path.join(ROOT, "build"))
+BUILD = os.path.join(ROOT, os.environ.get("BUILD", "build-bench"))
 sys.path.insert(0, os.path.join(BUILD, "python"))
 import vdbshade  # noqa: E402
 
 EMPTY, VALID, INVALID, UNCLEAR = range(4)  # verdicts of the truth (bench/judge.h)
-BLACK, BRIGHT, WRONG = 0.02, 0.5, 0.25  # below where truth is above: a mistake; an error that is seen at a glance
+BLACK, BRIGHT, WRONG = 0.02, 0.5, 0.25  # black: below the first where truth is above the second; WRONG is visible at a glance
 SUN, ANGLE, SEEN_ANGLE, AO = "0.4,0.8,0.3", "2", "20", "1"
-STEP = 4  # pixels of the judge's pictures to one of the sheet
+STEP = 4  # the sheet shows every fourth pixel
 SEEN = ["%s_%s" % (c, f) for c in ("ao", "shadow") for f in ("rmse", "dark", "bright", "wide_dark", "wide_bright")]
 LIMITS = {"shadow_rmse": 0.02, "ao_rmse": 0.02, "black_texels": 0, "black_triangles": 0, "compare": 0,
           "seen_ao_rmse": 0.01, "seen_ao_wide_dark": 0.01, "seen_ao_wide_bright": 0.01, "seen_shadow_wide_dark": 0.01,
           "seen_shadow_wide_bright": 0.01}  # at most
-RIGHT = 5000  # one verdict of so many may be wrong
+RIGHT = 5000  # at most one verdict in this many may be wrong
 
 
 def options():
@@ -51,12 +51,12 @@ def options():
     p.add_argument("--size", default="1024")
     p.add_argument("--compare", action="store_true")
     p.add_argument("--seen-only", action="store_true")
-    p.add_argument("--keep", action="store_true", help="judge bakes of this run that are there again")
+    p.add_argument("--keep", action="store_true", help="judge existing bakes of this run again")
     return p.parse_intermixed_args()
 
 
 def timed(command, log):
-    """Seconds of processor, of wall clock are another's business on a shared machine; and the exit code."""
+    """Processor seconds (a shared machine spoils wall clock), and the exit code."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with open(log, "a", encoding="utf-8") as f:
         f.write("$ %s\n" % shlex.join(command))
@@ -123,7 +123,7 @@ def write_picture(path, picture):
 
 
 def alike(first, second):
-    """RMSE of shadow and AO over texels that both bakes have as valid, and texels that only one has."""
+    """RMSE of shadow and AO over texels valid in both bakes, and the number of texels valid in one only."""
     a, b = vdbshade.image_read(first), vdbshade.image_read(second)
     if a["A"].shape != b["A"].shape:
         return "no"
@@ -132,7 +132,7 @@ def alike(first, second):
 
 
 def sheet(path, pictures, columns=3, gap=6):
-    """The pictures in their order, each shadow above AO: bake, truth, error × 4."""
+    """Writes the pictures in order, each with shadow above AO: bake, truth, error × 4."""
     tiles = []
     for picture in map(vdbshade.image_read, pictures):
         tile = numpy.stack([picture[c][::STEP, ::STEP] for c in "RGB"], axis=2)
@@ -241,7 +241,7 @@ def main():
     where = os.path.join(o.folder, "assets")
     if not glob(os.path.join(where, "*.glb")):
         subprocess.run(["blender", "-b", "--python-exit-code", "1", "--python",
-                        os.path.join(ROOT, "tools", "make_game_assets.py"), "--", where], check=True,
+                        os.path.join(ROOT, "tools", "modelling", "make_game_assets.py"), "--", where], check=True,
                        stdout=subprocess.DEVNULL)
     for part in ("truth", o.run):
         os.makedirs(os.path.join(o.folder, part), exist_ok=True)

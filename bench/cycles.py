@@ -1,11 +1,10 @@
 #!/usr/bin/env python3
-"""Blender's Cycles against vdbshade and the Embree baker of bench/: sun and AO of the sample asset at 1024², whole processes
-on all cores, of vdbshade by --max-error alone. Error is against Embree's rays, over the texels that are valid. Needs Blender
-(Debian: apt-get install --no-install-recommends blender python3-numpy); without it Cycles is left out.
+"""Compares Blender's Cycles with vdbshade (--max-error alone) and the Embree baker: sun and AO of the sample asset at 1024², whole
+processes on all cores. Errors are against Embree's rays, over valid texels. Skips Cycles if Blender is not installed.
 
-Usage: tools/bench-cycles [CSV]     (bench/results/cycles.csv)
-Environment: SAMPLES="1 4 16 64 256" of Cycles, SIZE=1024, REPEAT=3 (rounds of vdbshade and Embree in turn, medians are kept),
-BUILD=build-bench, WORK=a folder for the images, which are kept there."""
+Usage: tools/bench cycles [CSV]     (bench/results/cycles.csv)
+Environment: SAMPLES="1 4 16 64 256" of Cycles, SIZE=1024, REPEAT=3 (rounds of vdbshade and Embree; the table has medians),
+WORK=a folder that keeps the images."""
 import csv
 import os
 import resource
@@ -17,8 +16,7 @@ import tempfile
 import time
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-sys.path.insert(0, os.path.join(ROOT, "bench"))
-import lightmap  # noqa: E402
+import lightmap
 
 ASSET = os.path.join(ROOT, "assets", "cloister.glb")
 SUN, ANGLE, DISTANCE = "-0.5,0.8,-0.6", "5", "0.6"
@@ -31,7 +29,7 @@ CORES = str(len(os.sched_getaffinity(0)))
 LIGHTS = ["--sun=" + SUN, "--sun-angle", ANGLE, "--ao", DISTANCE, "--size", SIZE]
 CHANNELS = ("shadow.sun", "ao")
 
-# What is tried beside Cycles: name, command.
+# The runs beside Cycles: name and command.
 VDBSHADE = [os.path.join(BUILD, "vdbshade"), "bake", ASSET, "--quiet", *LIGHTS, "--max-error"]
 EMBREE = [os.path.join(BENCH, "vsh_embree_bake"), ASSET, *LIGHTS, "--rays"]
 TRIED = [("vdbshade %g" % e, [*VDBSHADE, str(e)]) for e in (0.2, 0.1, 0.05, 0.02, 0.01, 0.005)]
@@ -39,24 +37,18 @@ TRIED += [("embree %d" % n, [*EMBREE, str(n)]) for n in (4, 16, 64, 256)]
 
 
 def run(command, **options):
-    """Wall and processor seconds of a process with its children."""
+    """Wall and processor seconds of a process, including its children."""
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, **options)
     wall, after = time.monotonic() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode != 0:
-        sys.exit("bench-cycles: %s: exit code %d\n%s" % (" ".join(command), done.returncode, done.stdout[-2000:]))
+        sys.exit("cycles: %s: exit code %d\n%s" % (" ".join(command), done.returncode, done.stdout[-2000:]))
     return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def error(truth, channel, path, of_file, valid):
-    """RMSE and bias of a file's channel over the texels that are valid."""
+    """RMSE and bias of a file's channel over valid texels."""
     return lightmap.compare(lightmap.load(BUILD), truth, channel, path, of_file, valid)[1:3]
-
-
-def build():
-    subprocess.run([os.path.join(ROOT, "tools", "setup")], check=True)
-    subprocess.run([os.path.join(ROOT, "tools", "build"), os.path.basename(BUILD), "-DCMAKE_BUILD_TYPE=Release",
-                    "-DVSH_BENCH=ON", "-DVSH_PYTHON=ON"], check=True)
 
 
 class Table:
@@ -90,17 +82,17 @@ def measure_tried(work, table, centre):
 def measure_cycles(work, table, centre, area):
     blender = shutil.which("blender")
     if blender is None:
-        print("bench-cycles: no blender: its side is left out")
+        print("cycles: Blender is not installed: skipping Cycles")
         return []
-    # Blender takes its Python's library from the first python3 of the path: let that be its neighbour.
+    # Blender loads the Python library of the first python3 in PATH; its own folder has the right one.
     environment = dict(os.environ, PATH=os.path.dirname(blender) + os.pathsep + os.environ["PATH"])
     rows = []
     for samples in SAMPLES:
         out = os.path.join(work, "cycles-%d" % samples)
         wall, cpu = run([blender, "-b", "--factory-startup", "--python-exit-code", "1", "-P",
-                         os.path.join(ROOT, "tools", "cycles_bake.py"), "--", ASSET, out, SIZE, str(samples), CORES,
+                         os.path.join(ROOT, "bench", "cycles_bake.py"), "--", ASSET, out, SIZE, str(samples), CORES,
                          SUN, ANGLE, DISTANCE], env=environment)
-        # One sample is taken at the texel's centre, several are spread over it: the truth is that of either.
+        # One sample lies at the texel's centre; several spread over the texel. Each case has its own truth.
         truth = centre if samples == 1 else area
         off = [error(truth, channel, out + suffix, "R", centre)
                for channel, suffix in zip(CHANNELS, ("-shadow.exr", "-ao.exr"))]
@@ -110,7 +102,7 @@ def measure_cycles(work, table, centre, area):
 
 
 def measure(work, table):
-    # A texel of Cycles is the mean over its area, one of ours what its centre sees: each has its own truth.
+    # Cycles averages over a texel's area, vdbshade shades its centre, so each has its own truth.
     centre, area = os.path.join(work, "centre.exr"), os.path.join(work, "area.exr")
     if not os.path.exists(centre):
         run([*EMBREE, "4096", "--frame", "1", "-o", centre])
@@ -121,13 +113,13 @@ def measure(work, table):
 
 
 def report(ours, theirs):
-    print("\nThe fastest whose shadow and AO are both no farther from the truth than Cycles':")
+    print("\nThe fastest run with errors of shadow and AO up to those of Cycles:")
     for name, wall, cpu, shadow, _, ao, _ in theirs:
         print("  %s (shadow %.4f, AO %.4f; %.1f s):" % (name, shadow, ao, wall))
         for kind in ("vdbshade", "embree"):
             good = [o for o in ours if o[0].startswith(kind) and o[3] <= shadow and o[5] <= ao]
             if not good:
-                print("    %s: none of those tried is as near" % kind)
+                print("    %s: no run is as accurate" % kind)
                 continue
             best = min(good, key=lambda o: o[1])
             print("    %s (shadow %.4f, AO %.4f; %.2f s): %.1f times as fast (%.1f by processor time)" % (
@@ -136,9 +128,7 @@ def report(ours, theirs):
 
 def main():
     path = sys.argv[1] if len(sys.argv) > 1 else os.path.join(ROOT, "bench", "results", "cycles.csv")
-    if os.environ.get("BUILD") is None:
-        build()
-    work = os.environ.get("WORK") or tempfile.mkdtemp(prefix="bench-cycles-")
+    work = os.environ.get("WORK") or tempfile.mkdtemp(prefix="cycles-")
     os.makedirs(work, exist_ok=True)
     report(*measure(work, Table(path)))
     print("images: %s" % work)

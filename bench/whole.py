@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Whole bakes, from start to file: `vdbshade bake --max-error E` with nothing else said, beside an Embree baker
-(bench/embree_bake.c) at the rays that reach the error which ours was found to have. Error is root mean square against 4096
-rays a texel of another scramble, over all texels that these call valid, guesses of padding included. What is timed runs in
-turn: ours, Embree's power of two below, the one above; seconds between these by powers.
+"""Times whole bakes, from start to file: `vdbshade bake --max-error E`, and an Embree baker (bench/embree_bake.c) with the
+number of rays that gives the same error. The error is the root mean square against 4096 rays a texel of another scramble, over
+all texels that this truth calls valid, including values from padding. Three runs take turns: vdbshade, and Embree with the powers
+of two below and above that number. The baker's seconds are interpolated between these.
 
-Usage: tools/bench-whole [OPTIONS]        all cells at 1024², into bench/results/MACHINE-whole.csv; an hour on two idle cores
-       tools/bench-whole --asset cloister --light ao --error 0.02 --csv cell.csv        one of them
-       tools/bench-whole --error-only     errors alone, which need no idle machine
-       tools/bench-whole --size 4096      sun of 5° and AO, at the errors that matter there
+Usage: tools/bench whole [OPTIONS]        all cells at 1024², into bench/results/MACHINE-whole.csv; an hour on two idle cores
+       tools/bench whole --asset cloister --light ao --error 0.02 --csv cell.csv        one cell
+       tools/bench whole --error-only     only errors; the machine need not be idle
+       tools/bench whole --size 4096      a sun of 5° and AO, at the errors that matter there
 
-Truths and the level are made once and kept in --work; those of another rasteriser, or of other rules of where rays begin and
-what is valid, are to be deleted there."""
+Truths and the level are made once and kept in --work. Delete them there if the rasteriser, the rays' origins or the rules for valid
+texels change."""
 import argparse
 import csv
 import math
@@ -21,8 +21,7 @@ import sys
 import time
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
-sys.path.insert(0, os.path.join(ROOT, "bench"))
-import lightmap  # noqa: E402
+import lightmap
 
 TRUTH_FRAME, MOST_RAYS = 1, 4096
 SUN = "--sun=-0.5,0.8,-0.6"
@@ -36,7 +35,7 @@ COLUMNS = ["asset", "light", "size", "threads", "max_error", "texels", "rmse", "
 
 
 class Run:
-    """A process that has ended: its seconds, with those of its children, and its memory."""
+    """A finished process: its seconds, including those of its children, and its peak memory in MB."""
 
     def __init__(self, command):
         start = time.monotonic()
@@ -46,11 +45,11 @@ class Run:
         self.wall, self.cpu = time.monotonic() - start, used.ru_utime + used.ru_stime
         self.peak = used.ru_maxrss / 1000
         if status != 0:
-            sys.exit("bench-whole: %s: status %d\n%s" % (" ".join(command), status, said[-2000:]))
+            sys.exit("whole: %s: status %d\n%s" % (" ".join(command), status, said[-2000:]))
 
 
 class Cell:
-    """An asset under a light at a size: its truth, and what Embree's rays are off by."""
+    """An asset under one light at one size: its truth, and the error of Embree by number of rays."""
 
     def __init__(self, bench, asset, light):
         self.bench, self.asset, self.light = bench, asset, light
@@ -86,7 +85,7 @@ class Cell:
         return self.rmse[rays]
 
     def rays_around(self, rmse):
-        """Powers of two, the first with at least this error and the second with less; the ends of what there is."""
+        """Two successive powers of two of rays: the first has at least this error, the second less."""
         rays = 1
         while rays < MOST_RAYS // 4 and self.embree_rmse(2 * rays) > rmse:
             rays *= 2
@@ -104,7 +103,7 @@ class Cell:
             rounds = [[Run(command) for command in (self.ours(error, ours), self.embree(low, embree),
                                                     self.embree(high, embree))] for _ in range(self.bench.repeat)]
             steps = math.log(self.embree_rmse(low) / off[1]) / math.log(self.embree_rmse(low) / self.embree_rmse(high))
-            part = max(steps, 0.0)  # one ray is near enough: no less can be cast
+            part = max(steps, 0.0)  # one ray already suffices
             row["embree_rays"] = low * 2 ** part
             row["embree_peak_mb"] = max(run[2].peak for run in rounds)
             for clock in ("wall", "cpu"):
@@ -132,7 +131,7 @@ class Bench:
         path = os.path.join(self.work, name + ".glb")
         if not os.path.exists(path):
             triangles = "5000000" if name == "level5" else "1000000"
-            subprocess.run([os.path.join(ROOT, "tools", "make_level.py"), path, triangles], check=True)
+            subprocess.run([os.path.join(ROOT, "tools", "modelling", "make_level.py"), path, triangles], check=True)
         return path
 
 
@@ -142,7 +141,7 @@ def text(row, column):
 
 
 def table(rows):
-    """For bench/README.md: a line a scene and light, a column an error."""
+    """Prints the table of bench/README.md: a row for each scene and light, a column for each error."""
     errors = list(dict.fromkeys(row["max_error"] for row in rows))
     cells = {(row["asset"], row["light"], row["max_error"]): "%.4f%s, %.2f s%s" % (
         row["rmse"], "" if row["rmse"] <= row["max_error"] else " (!)", row["wall_s"],
@@ -161,10 +160,10 @@ def parse():
     parser.add_argument("--error", action="append", type=float)
     parser.add_argument("--size", type=int, default=1024)
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)))
-    parser.add_argument("--repeat", type=int, default=3, help="rounds that are timed; medians are kept")
-    parser.add_argument("--truth-rays", type=int, default=4096, help="fewer where a large truth takes too long")
+    parser.add_argument("--repeat", type=int, default=3, help="timed rounds; the table has their medians")
+    parser.add_argument("--truth-rays", type=int, default=4096, help="fewer if a large truth takes too long")
     parser.add_argument("--error-only", action="store_true")
-    parser.add_argument("--build", default="build-bench")
+    parser.add_argument("--build", default=os.environ.get("BUILD", "build-bench"))
     parser.add_argument("--work", default=os.path.join(ROOT, "build-bench", "whole"))
     parser.add_argument("--csv")
     return parser.parse_args()
@@ -178,9 +177,6 @@ def machine():
 
 def main():
     asked = parse()
-    if asked.build == "build-bench":
-        subprocess.run([os.path.join(ROOT, "tools", "build"), asked.build, "-DCMAKE_BUILD_TYPE=Release", "-DVSH_BENCH=ON", "-DVSH_PYTHON=ON"],
-                       check=True)
     bench = Bench(asked)
     rows = []
     path = asked.csv or os.path.join(ROOT, "bench", "results", machine() + "-whole.csv")

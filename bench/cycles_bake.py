@@ -1,7 +1,7 @@
-"""Bakes a glTF asset's shadow and ambient occlusion with Cycles on the processor, for tools/bench-cycles.
+"""Bakes a glTF asset's shadow and ambient occlusion with Cycles on the processor, for bench/cycles.py.
 
 Run by Blender:
-    blender -b --factory-startup -P tools/cycles_bake.py -- ASSET OUT SIZE SAMPLES THREADS X,Y,Z DEGREES DISTANCE
+    blender -b --factory-startup -P bench/cycles_bake.py -- ASSET OUT SIZE SAMPLES THREADS X,Y,Z DEGREES DISTANCE
 X, Y, Z: towards the sun, in the asset's axes; DEGREES: its diameter; DISTANCE: of AO. Writes OUT-shadow.exr and
 OUT-ao.exr, 32-bit floats, row 0 at v = 1.
 
