@@ -29,7 +29,7 @@ QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points poin
 }
 
 @test "kill -9 at points over a bake: the old output is intact, the next run tidies up" {
-    run "$BATS_TEST_DIRNAME/../../tools/kill-bakes" "$VDBSHADE" 6
+    run "$BATS_TEST_DIRNAME/../faults/kill-bakes" "$VDBSHADE" 6
     echo "$output"
     [ "$status" -eq 0 ]
 }

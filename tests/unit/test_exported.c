@@ -1,5 +1,5 @@
-/* One scene in every format that is read, as Blender 3.4 writes it (tools/export_models.py): the same
- * triangles in the same places. */
+/* One scene in every format that is read, as Blender 3.4 writes it (tools/modelling/export_models.py): the
+ * same triangles in the same places. */
 #include "handles.h"
 #include "models.h"
 

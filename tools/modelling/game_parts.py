@@ -1,9 +1,9 @@
-"""Meshes as lists of vertices and faces, and the shapes that tools/game_assets.py is made of. Metres, z up."""
+"""Meshes as lists of vertices and faces, and the shapes that game_assets.py is made of. Metres, z up."""
 from math import cos, pi, sin, sqrt
 
 
 class Part:
-    """A mesh. kind tells what a person takes it for: "solid" (what is behind its faces is inside), "room" (the same, of
+    """A mesh. kind is what a person would call it: "solid" (what is behind its faces is inside), "room" (the same, of
     a mesh whose faces look inwards) "sheet" (nothing is behind it) or "hollow" (a vessel or pipe of one wall: either is right). true_faces are the faces before some of them were
     flipped by mistake."""
 

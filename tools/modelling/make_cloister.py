@@ -6,9 +6,9 @@ the courtyard opens towards +x and +z. Parts that stand on others are sunk by SI
 """
 import os
 
-from modelling import atlas
-from modelling.files import Part, write_glb, write_obj
-from modelling.solids import XY, ZY, Solid, arc, box, check_solid, lathe, line, prism, strip, tube
+import atlas
+from files import Part, write_glb, write_obj
+from solids import XY, ZY, Solid, arc, box, check_solid, lathe, line, prism, strip, tube
 
 TEXELS_PER_UNIT = 64.5  # lightmap density at 1024²
 UNSEEN = 0.25           # of that density, for the one face that nobody sees: the underside of the ground
@@ -281,7 +281,7 @@ def main():
     charts = [chart for part in model for chart in part.charts()]
     atlas.pack(charts, TEXELS_PER_UNIT)
     used = atlas.check(charts)
-    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets")
+    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "assets")
     size = write_glb(os.path.join(folder, "cloister.glb"), "cloister", "make_cloister.py", model)
     vertices = write_obj(os.path.join(folder, "cloister.obj"), "The corner of a cloister's courtyard", model)
     print("%d parts in %d meshes, %d triangles, %d vertices, %d charts, %.1f %% of the lightmap used, GLB %d bytes"

@@ -1,4 +1,4 @@
-"""The sixteen game assets of tools/make_game_assets.py, as lists of (name, Part). Metres, z up."""
+"""The sixteen game assets of tools/modelling/make_game_assets.py, as lists of (name, Part). Metres, z up."""
 from math import atan2, cos, exp, hypot, pi, sin, sqrt
 from random import Random
 

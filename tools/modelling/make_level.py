@@ -1,17 +1,17 @@
 #!/usr/bin/env python3
-"""Makes a level to measure on, too large to be committed: 64 plots on a ground of 24 × 24 units, each with a head of holes
+"""Makes a level for benchmarks, too large to commit: 64 plots on a ground of 24 × 24 units, each with a head of holes
 (eyes, mouth, an open neck) on a pedestal, a fence of posts and rails, and an open sheet or a frame of slats over it all. 257
 objects, of which heads have most of the triangles.
 
-Usage: tools/make_level.py FILE.glb [TRIANGLES]      a million, up to 7; Python 3 only, the same bytes each time; a minute a million
+Usage: tools/modelling/make_level.py FILE.glb [TRIANGLES]      a million, up to 7; Python 3 only, the same bytes each time; a minute a million
 """
 import os
 import sys
 from math import cos, pi, sin, sqrt
 
-from modelling import atlas
-from modelling.files import Part, write_glb
-from modelling.solids import Chart, Solid, box, cross, sub, unit
+import atlas
+from files import Part, write_glb
+from solids import Chart, Solid, box, cross, sub, unit
 
 PLOTS, PLOT = 8, 3.0
 CLOTH = 36  # cells along a sheet
@@ -20,7 +20,7 @@ DENSITIES = [28.0 * 0.94 ** i for i in range(24)]  # texels a unit at 1024²: th
 
 
 class Rectangle:
-    """What the packer sees of a chart that is a rectangle: however many triangles it has, two."""
+    """Two triangles that stand for a rectangular chart in the packer, however many triangles the chart has."""
 
     def __init__(self, chart, width, height, density=1.0):
         self.chart, self.density = chart, density
@@ -29,7 +29,7 @@ class Rectangle:
         self.triangles = [(0, 1, 2), (0, 2, 3)]
 
     def give(self):
-        """The chart's vertices their places in the lightmap, which may have turned the rectangle."""
+        """Gives the chart's vertices their UVs. The packer may have turned the rectangle."""
         (ox, oy), (ux, uy), _, (vx, vy) = self.lightmap
         self.chart.lightmap = []
         for _, _, (u, v), _ in self.chart.vertices:

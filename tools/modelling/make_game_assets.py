@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Makes the sixteen game assets that tools/judge-assets bakes, each as GLB, OBJ and FBX with lightmap UVs in its
-second set. NAME.solids.obj says what a person takes for solid. NAME_smooth.glb is NAME.glb, smooth-shaded up to
+"""Makes the sixteen game assets that `tools/bench assets` bakes, each as GLB, OBJ and FBX with lightmap UVs in its
+second set. NAME.solids.obj says what a person would call solid. NAME_smooth.glb is NAME.glb, smooth-shaded up to
 60° between faces; it is missing where that changes nothing.
 
-  blender -b --python tools/make_game_assets.py -- FOLDER [NAME…]
+  blender -b --python tools/modelling/make_game_assets.py -- FOLDER [NAME…]
 
 Needs Blender 3.4. The same files each time. Metres; z is up in here, y in the files.
 """
@@ -123,7 +123,7 @@ def make(folder, name, build):
 def main():
     words = sys.argv[sys.argv.index("--") + 1:] if "--" in sys.argv else []
     if not words:
-        raise SystemExit("usage: blender -b --python tools/make_game_assets.py -- FOLDER [NAME…]")
+        raise SystemExit("usage: blender -b --python tools/modelling/make_game_assets.py -- FOLDER [NAME…]")
     os.makedirs(words[0], exist_ok=True)
     for name in words[1:] or sorted(ASSETS):
         make(words[0], name, ASSETS[name])

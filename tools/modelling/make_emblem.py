@@ -41,7 +41,7 @@ def main():
     rows = b"".join(b"\0" + b"".join(bytes((255, coverage(c, r))) for c in range(SIZE)) for r in range(SIZE))
     header = struct.pack(">IIBBBBB", SIZE, SIZE, 8, 4, 0, 0, 0)  # grey and alpha
     png = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(rows, 9)) + chunk(b"IEND", b"")
-    target = pathlib.Path(__file__).resolve().parent.parent / "assets" / "emblem.png"
+    target = pathlib.Path(__file__).resolve().parents[2] / "assets" / "emblem.png"
     target.write_bytes(png)
 
 

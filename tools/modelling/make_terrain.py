@@ -80,5 +80,5 @@ def write_png(path, size):
 
 if __name__ == "__main__":
     here = os.path.dirname(os.path.abspath(__file__))
-    write_png(sys.argv[2] if len(sys.argv) > 2 else os.path.join(here, "..", "assets", "terrain.png"),
+    write_png(sys.argv[2] if len(sys.argv) > 2 else os.path.join(here, "..", "..", "assets", "terrain.png"),
               int(sys.argv[1]) if len(sys.argv) > 1 else 256)

@@ -1,6 +1,6 @@
 """Makes tests/models: one small scene in every format that is read, as Blender 3.4 writes it.
 
-    blender -b --factory-startup --python tools/export_models.py -- FOLDER
+    blender -b --factory-startup --python tools/modelling/export_models.py -- FOLDER
 
 The scene, in Blender's axes (z up): a box of two materials and two UV sets, moved; an L of one polygon, a
 child of the box, turned and scaled; of "figure" a bar on two bones, the upper of which is bent to the right.

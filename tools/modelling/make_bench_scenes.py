@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes what speed and accuracy are measured on beside the sample asset: assets/smooth.glb, a lobed ring of some
+"""Makes two scenes for benchmarks: assets/smooth.glb, a lobed ring of some
 50 000 triangles over a plate, and assets/thin.glb, posts, slats and a roof sheet over a floor.
 
 Needs Python 3 only, takes no arguments, and writes the same bytes each time. Lengths are scene units, y is up.
@@ -7,9 +7,9 @@ Needs Python 3 only, takes no arguments, and writes the same bytes each time. Le
 import os
 from math import cos, pi, sin
 
-from modelling import atlas
-from modelling.files import Part, write_glb
-from modelling.solids import Solid, box, check_solid, cross, sub, unit
+import atlas
+from files import Part, write_glb
+from solids import Solid, box, check_solid, cross, sub, unit
 
 GREY = ("grey", (0.7, 0.7, 0.7))
 UNSEEN = 0.25  # of the lightmap's density, for the underside of a ground that nobody sees
@@ -70,7 +70,7 @@ def write(name, parts, texels_per_unit):
     charts = [chart for part in parts for chart in part.charts()]
     atlas.pack(charts, texels_per_unit)
     used = atlas.check(charts)
-    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "assets")
+    folder = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "assets")
     size = write_glb(os.path.join(folder, name + ".glb"), name, os.path.basename(__file__), parts)
     print("%s: %d triangles, %d charts, %.1f %% of the lightmap used, %d bytes"
           % (name, sum(len(c.triangles) for c in charts), len(charts), 100 * used, size))
