@@ -1,5 +1,4 @@
-# The libraries that Debian 12 has packages for (tools/packages.txt), each as a target vsh::NAME. Their headers are
-# SYSTEM, so that our warnings stay ours.
+# The libraries of tools/packages.txt, each as a target vsh::NAME. SYSTEM headers, so that compilers do not warn about them.
 include(FindPackageHandleStandardArgs)
 find_package(TBB REQUIRED CONFIG)
 find_package(OpenEXR 3.1 REQUIRED CONFIG)
@@ -31,7 +30,7 @@ vsh_find(nettle nettle/sha2.h nettle)
 vsh_find(sleef sleef.h sleef)
 vsh_find(half Imath/half.h Imath-3_1)
 
-# three.js, which is put into the pages that `view` writes.
+# three.js, which `view` embeds in its pages.
 find_path(VSH_three_FOLDER three.min.js PATHS /usr/share/javascript/three)
 mark_as_advanced(VSH_three_FOLDER)
 
@@ -51,7 +50,7 @@ if(NOT TARGET vsh::openexr)
   target_link_libraries(vsh::dependencies INTERFACE TBB::tbb vsh::half vsh::openexr vsh::png vsh::meshoptimizer vsh::jansson
                                                     vsh::nettle vsh::sleef vsh::seccomp Freetype::Freetype ZLIB::ZLIB
                                                     ${CMAKE_DL_LIBS} m)
-  # Its headers, and the name that src/trace/embree.c loads it by.
+  # The headers, and the name by which src/trace/embree.c loads the library.
   get_target_property(config embree IMPORTED_CONFIGURATIONS)
   list(GET config 0 config)
   get_target_property(soname embree IMPORTED_SONAME_${config})

@@ -1,5 +1,4 @@
-# The C interface as pages, where Doxygen is: they are installed with the documents. The test `api` holds that every symbol is
-# documented.
+# Pages of the C interface, if Doxygen is installed. The test `api` checks that every symbol has a comment.
 find_program(VSH_DOXYGEN doxygen)
 mark_as_advanced(VSH_DOXYGEN)
 configure_file(cmake/Doxyfile.in Doxyfile @ONLY)

@@ -1,13 +1,13 @@
-# A public header as Doxygen takes it: comments are its comments. The first of a file is the file's; one behind a line of
-# members is that of all of them, and declarations right below a function's, without one of their own, are told there.
+# Rewrites a public header for Doxygen. The first comment describes the file. A comment behind a line of members describes all of
+# them. A function without a comment shares that of the function above.
 NR == 1 && /^\/\* / {
     sub(/\/\* /, "/** @file\n * ")
     print
     next
 }
 
-# What the headers leave to be understood: "these four as in …" is said of the first; the upper corner of a box, the height
-# of what has a width, the count that is named in brackets where its array is told are told with what stands above them.
+# Members that share the comment above them: those after "these four as in …", the upper corner of a box, the height after a width,
+# the count of an array whose comment names it in brackets.
 function understood(name) {
     if (covered > 0) return --covered >= 0
     return (name ~ /max$/ && above ~ /min$/) || (name == "height" && above == "width") || \
@@ -38,7 +38,7 @@ in_struct_comment { above_text = above_text $0 }
 /^[ \t]+\/\* / || /;[ \t]*\/\* / { in_struct_comment = 1 }
 /\*\// { in_struct_comment = 0 }
 
-# members of a line, behind which a comment begins that may go on over lines
+# members of one line, before a comment that may continue on the next lines
 members != "" {
     text = $0
     sub(/^[ \t]*\*?[ \t]*/, "", text)
@@ -99,7 +99,7 @@ in_function {
     next
 }
 
-# macros: a comment holds for those in a row, and for one in an #if below it
+# macros: a comment describes successive macros, and one in an #if below it
 /^#define VSH_/ && macro_text != "" { print "/** " macro_text " */ " $0; next }
 /^\/\* .*\*\/[ \t]*$/ { macro_text = $0; gsub(/^\/\* | *\*\/[ \t]*$/, "", macro_text) }
 !/^#/ && !/^\/\* / { macro_text = "" }

@@ -1,6 +1,5 @@
 # Writes files as arrays of C. Usage: cmake -DOUT=FILE.c -DTHREE=FOLDER -DPAGE=FOLDER -P embed.cmake
-# Texts that would end a script or style early, or that HTML would read otherwise than as they stand, are refused: the
-# page names each by the hash of its bytes.
+# The page names each text by the hash of its bytes, so texts that HTML would change or end early are errors.
 cmake_minimum_required(VERSION 3.25)
 
 set(style ${PAGE}/page.css)

@@ -1,4 +1,4 @@
-# Writes pages of docs/ as a table of arrays of C. Usage: cmake -DOUT=FILE.c -DPAGES=A.md,B.md -P embed_docs.cmake
+# Writes pages of docs as a table of C arrays. Usage: cmake -DOUT=FILE.c -DPAGES=A.md,B.md -P embed_docs.cmake
 cmake_minimum_required(VERSION 3.25)
 
 string(REPLACE "," ";" pages "${PAGES}")

@@ -1,6 +1,5 @@
-# How everything is compiled: strict warnings, no contraction and no fast-math (the same bits on every machine).
-# Compilers turn loops into vectors only where they need not care for floating-point traps and errno; neither changes
-# a result.
+# Flags of all code: strict warnings; no contraction and no fast-math, for the same bits on every machine. Ignoring floating-point
+# traps and errno lets compilers vectorise loops and changes no result.
 set(CMAKE_C_STANDARD 11)
 set(CMAKE_C_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_STANDARD 17)
@@ -12,12 +11,12 @@ set(VSH_SANITIZE_FLAGS -fno-omit-frame-pointer -fno-sanitize-recover=all)
 if(VSH_SANITIZE)
   add_compile_options(-fsanitize=${VSH_SANITIZE} ${VSH_SANITIZE_FLAGS})
   add_link_options(-fsanitize=${VSH_SANITIZE})
-  if(CMAKE_C_COMPILER_ID MATCHES Clang) # programs in C link what is in C++
+  if(CMAKE_C_COMPILER_ID MATCHES Clang) # C programs link C++ objects
     add_link_options(-fsanitize-link-c++-runtime)
     link_libraries(stdc++)
   endif()
 endif()
-if(VSH_FUZZ) # what an input reaches is counted; OpenVDB's classes have types of their own in each library
+if(VSH_FUZZ) # coverage for libFuzzer; vptr checks fail for OpenVDB's classes, whose types differ in each library
   add_compile_options(-fsanitize=fuzzer-no-link -fno-sanitize=vptr)
   add_compile_options(
     $<$<COMPILE_LANGUAGE:CXX>:-fsanitize-ignorelist=${PROJECT_SOURCE_DIR}/tests/suppressions/fuzz.txt>)
@@ -29,14 +28,13 @@ function(vsh_set_flags target)
     $<$<BOOL:${VSH_WERROR}>:-Werror>)
 endfunction()
 
-# In the C of src each number that may change by a conversion is cast; signs apart, as sizes and indices meet everywhere.
+# C in src casts every conversion that may change a number, except between signed and unsigned sizes and indices.
 function(vsh_set_source_flags target)
   vsh_set_flags(${target})
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wno-sign-conversion>)
 endfunction()
 
-# Callers have stacks of 128 KiB: frames are small, but for those of kernels,
-# which run in vshi_on_stack() (src/base/threads.h).
+# Callers may have stacks of 128 KiB, so frames are small. Kernels need more and run in vshi_on_stack() (src/base/threads.h).
 set(VSH_LARGEST_FRAME 24576)
 file(GLOB VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/shade/*.c)
 list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/lightmap/volume.c ${PROJECT_SOURCE_DIR}/src/field/level.c)
@@ -47,7 +45,7 @@ function(vsh_limit_frames target)
   endif()
 endfunction()
 
-# The kernels are one source each, built once for each instruction set and chosen at run time: lanes at once and in a vector.
+# Each kernel is one source, built for each instruction set and chosen at run time. Per set: lanes marched together, lanes of a vector.
 set(VSH_KERNEL_base 16 4)
 set(VSH_KERNEL_few 4 4)
 set(VSH_KERNEL_avx2 16 8 -mavx2)

@@ -1,5 +1,5 @@
-# What `cmake --install` puts where, by component: library, development, program, documentation. The library is shared and its dependencies are private to it, so a program that
-# uses it looks for nothing else. CMake package and pkg-config file both find themselves: the prefix may be moved.
+# Installation by component: library, development, program, documentation. Users of the shared library need none of its
+# dependencies. The CMake package and the pkg-config file use relative paths, so the prefix may be moved.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS vdbshade EXPORT vdbshade-targets
@@ -7,7 +7,7 @@ install(TARGETS vdbshade EXPORT vdbshade-targets
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
 install(TARGETS ${VSH_MODULES} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
 
-# The program stands elsewhere, seen from the library, than in the build folder, and so is linked once more.
+# The installed program has another relative path to the library than the build's, so it is linked again.
 cmake_path(IS_ABSOLUTE CMAKE_INSTALL_LIBDIR absolute)
 if(absolute)
   set(VSH_LIBRARY_RPATH ${CMAKE_INSTALL_LIBDIR})
@@ -29,8 +29,8 @@ install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONE
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation FILES_MATCHING PATTERN "*.md" PATTERN "*.png")
 install(DIRECTORY examples assets DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT documentation)
 
-# The static library is the same objects, level sets and importers among them; images other than EXR and PNG stay in their module. Who
-# links it links what it needs: names, which the linker looks for where it looks for everything.
+# The static library includes level sets and importers; images other than EXR and PNG stay in their module. Its users link its
+# dependencies by name, so the linker searches its usual folders.
 option(VSH_STATIC "Build the static library too" ON)
 if(VSH_STATIC AND NOT VSH_SANITIZE)
   add_library(vdbshade_static STATIC $<TARGET_OBJECTS:vdbshade_objects> $<TARGET_OBJECTS:vdbshade_openvdb_objects>
@@ -63,7 +63,7 @@ install(FILES ${CMAKE_CURRENT_BINARY_DIR}/vdbshade-config.cmake
               ${CMAKE_CURRENT_BINARY_DIR}/vdbshade-config-version.cmake
         DESTINATION ${VSH_PACKAGE_DIR} COMPONENT development)
 
-# Folders that were given as absolute paths stay so; the others are found from where the .pc file lies.
+# Absolute folders stay absolute; others are relative to the .pc file.
 set(VSH_PC_DIR ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
 foreach(kind LIBDIR INCLUDEDIR)
   cmake_path(IS_ABSOLUTE CMAKE_INSTALL_${kind} absolute)

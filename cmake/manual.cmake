@@ -1,5 +1,5 @@
-# Pages of docs/ that the program prints (`vdbshade help TOPIC`), as arrays; and the man pages, which it writes
-# when it is built (`vdbshade help --write FOLDER`).
+# Pages of docs that `vdbshade help TOPIC` prints, as arrays, and man pages, which the built program writes
+# (`vdbshade help --write FOLDER`).
 set(VSH_HELP_PAGES ${PROJECT_BINARY_DIR}/help_pages.c)
 file(GLOB VSH_HELP_TEXTS CONFIGURE_DEPENDS docs/*.md)
 list(FILTER VSH_HELP_TEXTS EXCLUDE REGEX "/(architecture|README).md$") # for developers; an index of links
@@ -7,7 +7,7 @@ string(REPLACE ";" "," pages "${VSH_HELP_TEXTS}")
 add_custom_command(OUTPUT ${VSH_HELP_PAGES}
                    COMMAND ${CMAKE_COMMAND} -DOUT=${VSH_HELP_PAGES} "-DPAGES=${pages}" -P ${PROJECT_SOURCE_DIR}/cmake/embed_docs.cmake
                    DEPENDS cmake/embed_docs.cmake ${VSH_HELP_TEXTS} VERBATIM)
-add_library(vdbshade_help_pages OBJECT ${VSH_HELP_PAGES}) # of whatever is made of the command line's sources
+add_library(vdbshade_help_pages OBJECT ${VSH_HELP_PAGES}) # for every target made of the command line's sources
 vsh_set_source_flags(vdbshade_help_pages)
 target_include_directories(vdbshade_help_pages PRIVATE src include)
 

@@ -1,8 +1,7 @@
-# `import vdbshade`: src/bindings/python/vdbshade, and what src/bindings/python/generate.py makes of the public headers
-# and bindings.h. In
-# the build folder it is used by PYTHONPATH=FOLDER/python.
+# The Python module: src/bindings/python/vdbshade and declarations that generate.py makes from the public headers and bindings.h.
+# PYTHONPATH=FOLDER/python uses it from a build folder.
 #
-# The Python that is asked for is the system's, whose packages numpy and cffi are: the first one of PATH may be another.
+# Uses the system's Python, which has Debian's numpy and cffi, not the first one in PATH.
 find_program(VSH_PYTHON_PROGRAM NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH DOC "Python with numpy and cffi")
 find_program(VSH_PYTHON_PROGRAM NAMES python3)
 execute_process(COMMAND ${VSH_PYTHON_PROGRAM} -c "import sys, cffi, numpy; print(f'python{sys.version_info[0]}.{sys.version_info[1]}')"
@@ -30,8 +29,8 @@ endforeach()
 add_custom_target(vdbshade_python ALL DEPENDS ${made})
 add_dependencies(vdbshade_python vdbshade ${VSH_MODULES} vdbshade_reader)
 
-# Where the library is, from the package's folder. Debian's Python looks for packages of its own in lib/python3, under
-# /usr/local in a folder of its version.
+# The library's path relative to the package. Debian's Python has its packages in lib/python3, under /usr/local in a folder with its
+# version.
 function(vsh_write_location file library)
   file(CONFIGURE OUTPUT ${file} CONTENT "# Written when vdbshade is built: where the library is, from here.\nLIBRARY = \"${library}\"\n")
 endfunction()
