@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <vdbshade/vdbshade.h>
 
-/* Memory, or the end of the program. */
+/* Allocates memory, or ends the program. */
 static inline void *bench_take(size_t bytes) {
     void *memory = malloc(bytes > 0 ? bytes : 1);
     if (memory == NULL) {
@@ -15,7 +15,7 @@ static inline void *bench_take(size_t bytes) {
     return memory;
 }
 
-/* Ends the program with the error if a call has failed. */
+/* Ends the program with the error if a call failed. */
 static inline void bench_check(vsh_result result, const vsh_error *error) {
     if (result != VSH_OK) {
         fprintf(stderr, "bench: %s: %s\n", vsh_result_name(result), error->message);

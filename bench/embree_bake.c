@@ -1,11 +1,11 @@
-/* A lightmap by Embree alone, a whole process from its mesh to its file: what whole bakes are held against.
+/* Bakes a lightmap with Embree rays alone, from mesh to file: the baker that whole bakes are compared with.
  *
  *   vsh_embree_bake INPUT -o OUT.exr [--sun X,Y,Z --sun-angle DEGREES] [--ao DISTANCE] [--size N] [--rays N]
  *       [--frame N] [--threads N] [--stats FILE.json]
  *
- * It loads, rasterises, judges validity, pads and writes as `vdbshade bake` does, by the same code; between
- * that it traces N rays a texel (16) of the same sampler in Embree's packets. No level set, no field, no
- * proofs, nothing that texels share. Truth is that of many rays of another frame. */
+ * It loads, rasterises, finds valid texels, pads and writes with the code of `vdbshade bake`. In between it
+ * traces N rays a texel (16) of the same sampler in Embree's packets, without level set, proofs or sharing.
+ * Many rays of another frame give the truth. */
 #include "base/clock.h"
 #include "base/parallel.h"
 #include "common.h"
@@ -30,11 +30,11 @@ typedef struct options {
     int32_t size, rays, frame, threads;
 } options;
 
-/* A lightmap under way. */
+/* A lightmap being baked. */
 typedef struct baking {
     vshi_page page;
     vshi_placement placement;
-    vshi_lifter lifters[2]; /* of the sun, of AO */
+    vshi_lifter lifters[2]; /* for the sun, for AO */
     bench_rays_task tasks[2];
     float *planes[2]; /* NULL: not baked */
     uint32_t (*net)[2];
@@ -92,13 +92,12 @@ static options parse(int argc, char **argv) {
     return o;
 }
 
-/* What stands for a field in the rules of where rays begin: one whose distances are 0 everywhere, which
- * proves nothing. */
+/* A field whose distances are 0 everywhere: it proves nothing, and the rules for rays' origins need one. */
 static const vsh_field *field_of_nothing_known(const vshi_triangles *triangles) {
     static int32_t index[8];
     static int16_t values[VSHI_BRICK_VALUES];
     static vsh_field field = {.index = index, .values = values, .level_count = 1};
-    field.voxel_size = triangles->size / 96.0; /* of the program's, where all is traced */
+    field.voxel_size = triangles->size / 96.0; /* as vdbshade chooses it without voxels */
     field.levels[0] = (vshi_level){.brick_count = 1, .scale = 0x1p60f, .band = 0x1p60f, .quantum = 0x1p46f};
     for (int axis = 0; axis < 3; ++axis) {
         field.levels[0].origin[axis] = -VSHI_BRICK_CELLS;
@@ -109,7 +108,7 @@ static const vsh_field *field_of_nothing_known(const vshi_triangles *triangles) 
     return &field;
 }
 
-/* A tile's samples, one a texel, and where their rays begin. */
+/* A tile's samples, one a texel, and their rays' origins. */
 typedef struct tile_work {
     vshi_samples samples;
     vshi_origins origins;
@@ -209,7 +208,7 @@ static void write_stats(const options *o, const vsh_bake_stats *stats, const dou
 }
 
 int main(int argc, char **argv) {
-    const int32_t served = vsh_reader_serve(argc, argv); /* where it is its own reader */
+    const int32_t served = vsh_reader_serve(argc, argv); /* as its own reader */
     if (served >= 0) {
         return served;
     }
@@ -254,7 +253,7 @@ int main(int argc, char **argv) {
         fputs("embree_bake: the system refused memory\n", stderr);
         return 4;
     }
-    /* samples begin, and are valid, as of casters that are traced only */
+    /* origins and validity as for casters without voxels */
     vsh_occluders *occluders = NULL;
     vshi_occluder_parts parts = {.field = NULL};
     parts.triangles = triangles;

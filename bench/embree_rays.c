@@ -1,6 +1,6 @@
-/* Packets of one ray each of 16 texels that follow each other. All texels have the points of one net, whose
- * digits each shifts by its own: which permutes the cells of the square that hold one point each, so there is
- * one of every texel in any such cell, and those make a packet. */
+/* Traces packets with one ray of each of 16 successive texels. All texels use one net of points, and each
+ * shifts its digits. A shift permutes the cells of the square, which hold one point each. So each cell has
+ * one point of every texel, and these rays make a packet. */
 #include "embree_rays.h"
 
 #include "trace/embree_scene.h"
@@ -12,7 +12,7 @@ enum { LANES = 16 };
 
 static const float QUARTER = 0.78539816339744831f; /* π/4 */
 
-/* The samplers' sequences, as shading has them. */
+/* The sequences of the sampler in src/trace. */
 static const uint32_t LIGHT_PURPOSE = 0, AO_PURPOSE = 0xa0;
 
 static int bits_of(int32_t rays) {
@@ -23,7 +23,7 @@ static int bits_of(int32_t rays) {
     return bits;
 }
 
-/* Cell of a point among 2^bits, the first half of them columns. */
+/* Cell of a point among 2^bits; the first half of the bits are columns. */
 static uint32_t cell_of(int bits, const uint32_t digits[2]) {
     const int rows = bits / 2, columns = bits - rows;
     return (uint32_t)((uint64_t)digits[0] >> (32 - columns) << rows | (uint64_t)digits[1] >> (32 - rows));
@@ -41,7 +41,7 @@ uint32_t (*bench_rays_net(const vshi_sampler *sampler, int32_t rays))[2] {
     return sorted;
 }
 
-/* A packet's texels: all that is the same for all of their rays. */
+/* A packet's texels: what all their rays share. */
 typedef struct group {
     struct RTCRay16 ray;
     uint32_t shift[2][LANES], cell[LANES]; /* cell of the shift */
@@ -51,7 +51,7 @@ typedef struct group {
     int free[LANES];
 } group;
 
-/* The points of a packet on the unit disc; angles by series that are exact to 4e-7. */
+/* Points of a packet on the unit disc. Series for the angles are exact to 4e-7. */
 static inline void to_disc(uint32_t digits[2][LANES], float x[LANES], float y[LANES]) {
     for (int l = 0; l < LANES; ++l) {
         const float a = (float)(int32_t)(digits[0][l] ^ 0x80000000u) * 0x1p-31f;
@@ -122,7 +122,7 @@ static void trace_group(const bench_rays_task *task, const uint32_t (*net)[2], g
     }
 }
 
-/* Whether all of a light is under the horizon of a group's texels. */
+/* True if the whole light is below the horizon of a group's texels. */
 static bool is_away(const vshi_light_place *light, size_t count, const float *normals) {
     for (size_t i = 0; i < count; ++i) {
         if (vshi_dot(vshi_vec_off(normals + 3 * i), light->towards) > -light->sine) {

@@ -1,11 +1,11 @@
-/* What plain rays make of texels: as many for each, in Embree's packets, and nothing else. */
+/* Shades texels with the same number of rays each, in Embree's packets. */
 #pragma once
 
 #include "light/light.h"
 #include "trace/embree.h"
 #include "trace/sampler.h"
 
-/* Of texels that follow each other: a light's visible fraction, or what is open around them. */
+/* Shades successive texels: visible fraction of a light, or AO. */
 typedef struct bench_rays_task {
     const vshi_triangles *triangles;
     const vshi_sampler *sampler; /* of VSH_SAMPLER_SOBOL, and `rays` rays */
@@ -14,9 +14,8 @@ typedef struct bench_rays_task {
     double distance;
 } bench_rays_task;
 
-/* Digits of the sampler's net for `rays` rays, put in order: where these are a power of two, by cells of the
- * square that hold one each, so that the rays of neighbours in a packet go the same way. [rays][2]; NULL
- * where memory is short. */
+/* Digits of the sampler's net for `rays` rays, [rays][2]; NULL if memory is short. A power of two of rays is
+ * sorted by cells of the square, so that rays in a packet have similar directions. */
 uint32_t (*bench_rays_net(const vshi_sampler *sampler, int32_t rays))[2];
 
 /* Values of `count` texels whose rays begin at origins [count][3], world units. Normals [count][3] are unit.

@@ -1,9 +1,8 @@
-/* Fits what a cone of ambient occlusion sees, given how near it comes to the casters and how free its
- * neighbours are, to analytic rays: prints the table of src/shade/ao_cones.c and the errors it leaves. Scenes
- * of boxes, slats, spheres and closed rooms, none of which is used to measure the result. Not part of a
- * build's tests: run it after a change of the cones' directions or widths. The cones are marched in the field
- * as it is, without what vshi_shade_grown() takes off: fitted with that, sixteen cones were 0.001 brighter on
- * the cloister. */
+/* Prints the table of src/shade/ao_cones.c and its remaining errors. The table gives the open share of an AO
+ * cone from its closest approach to the casters and from the openness of its neighbours, fitted to analytic
+ * rays. The scenes (boxes, slats, spheres, closed rooms) measure nothing else. Run it after a change of the
+ * cones' directions or widths. Cones march the field without vshi_shade_grown(): fitted with it, sixteen
+ * cones were 0.001 brighter on the cloister. */
 #include "analytic.h"
 #include "shade/ao.h"
 
@@ -25,7 +24,7 @@ typedef struct sample_set {
     float truth[POINTS];
 } sample_set;
 
-/* Least squares of the table: a x = b, kept rising along both axes. */
+/* Least squares for the table: a x = b, rising along both axes. */
 typedef struct normal_equations {
     double a[CELLS][CELLS], b[CELLS];
 } normal_equations;
@@ -94,7 +93,7 @@ static vsh_field *field_of_room(double wall, double voxel) {
     return field_of(&(vsh_sdf){nodes, 3}, voxel);
 }
 
-/* Points on the surface, a voxel clear of other surfaces. A room's are on its floor. */
+/* Points on the surface, a voxel away from other surfaces; in rooms, on the floor. */
 static void place_points(sample_set *set, truth_scene scene, double half, double voxel, uint64_t seed) {
     uint64_t counter = seed;
     while (set->count < POINTS) {
@@ -133,7 +132,7 @@ static void place_points(sample_set *set, truth_scene scene, double half, double
     }
 }
 
-/* Against the solids themselves, so that the table makes good on average what the field rounds off. */
+/* Against the solids themselves, so that the table corrects the rounding of the field on average. */
 static void find_truth(sample_set *set, truth_scene scene) {
     for (size_t i = 0; scene.count > 0 && i < set->count; ++i) {
         const float *n = set->normals + 3 * i;
@@ -142,8 +141,7 @@ static void find_truth(sample_set *set, truth_scene scene) {
     }
 }
 
-/* Sums of the table's entries that each point's undecided cones take, over the number of cones, and the share
- * of free ones. */
+/* For each point: weights of the table's entries over its undecided cones, and the share of free cones. */
 typedef struct uses {
     double (*entries)[CELLS];
     double *free;
@@ -216,7 +214,7 @@ static void add_equations(normal_equations *n, const sample_set *set, const uses
     }
 }
 
-/* Smoothness decides where there is no evidence: neighbouring entries are drawn together. */
+/* Adds smoothness between neighbouring entries, which decides where there are no samples. */
 static void add_smoothness(normal_equations *n, double weight) {
     for (int i = 0; i < CELLS; ++i) {
         const int next[2] = {i % EDGE + 1 < EDGE ? i + 1 : -1, i + EDGE < CELLS ? i + EDGE : -1};
@@ -231,7 +229,7 @@ static void add_smoothness(normal_equations *n, double weight) {
     }
 }
 
-/* Coordinate descent within 0 … 1, each entry between its neighbours; wholly hidden and wholly free cones are
+/* Coordinate descent within 0 … 1, each entry between its neighbours. Fully hidden and fully free cones are
  * known. */
 static void solve(const normal_equations *n, double *table) {
     for (int i = 0; i < CELLS; ++i) {
@@ -319,7 +317,7 @@ static size_t make_sets(sample_set **sets) {
         slats[1 + i] = (truth_solid){TRUTH_BOX, {-1.05 + 0.3 * i, 0.8, 0.0}, {0.05, 0.05, 2.0}, 0.0, 0.0};
     }
     slats[9] = (truth_solid){TRUTH_BOX, {0.0, 1.4, 0.0}, {1.2, 0.04, 1.2}, 0.0, 0.0};
-    /* a yard with an arcade: wall, columns under arches' straight likes, a thin roof, a bench and steps */
+    /* a yard with an arcade: wall, columns, lintels, a thin roof, a bench and steps */
     const truth_solid parts[15] = {FLOOR,
                                    {TRUTH_BOX, {0.0, 0.7, -2.0}, {2.2, 0.9, 0.15}, 0.0, 0.0},
                                    {TRUTH_BOX, {-2.0, 0.7, 0.0}, {0.15, 0.9, 2.2}, 0.0, 0.0},

@@ -1,5 +1,5 @@
-/* Judges a model's lightmap for bench/assets.py: the truth, and the error of a bake. Reading models
- * and images is the library's, all else is of its own: texels, solids, rays. */
+/* Judges a model's lightmap for bench/assets.py: the truth, and the error of a bake. The
+ * library reads models and images. Texels, solids and rays are independent of its code. */
 #pragma once
 
 #include <stdbool.h>
@@ -10,7 +10,7 @@
 
 #include "embree.h"
 
-/* What truth says of a texel. */
+/* Verdict of the truth on a texel. */
 enum {
     JUDGE_EMPTY = 0,   /* of no chart, or within a thousandth of a texel of a chart's border */
     JUDGE_VALID = 1,   /* fewer than FEW of its rays leave solids more often than they enter, or first meet a
@@ -28,8 +28,8 @@ typedef struct judge_question {
     double angle; /* degrees, diameter */
     double distance;
     int32_t rays;
-    int32_t every;      /* N: one texel of N is looked at, from all rows and columns */
-    const char *solids; /* an OBJ of what a person takes for solids and for rooms; NULL: all are solids */
+    int32_t every;      /* judges one texel of N, in all rows and columns */
+    const char *solids; /* an OBJ with the objects that a person calls solid or room; NULL: all solid */
 } judge_question;
 
 /* Planes of [size × size], row 0 at v = 1. */
@@ -37,12 +37,12 @@ typedef struct judge_truth {
     float *verdict;
     float *shadow;
     float *ao;
-    float *apart; /* 1 where the light is near the horizon of a bent face: shadows are judged apart there */
+    float *apart;    /* 1 if the light is near the horizon of a bent face: judged separately */
     float *triangle; /* 1 + number among all triangles; 0 for none */
-    double units;    /* the model's size over that of the solids' file: 1 where it was read as it was meant */
+    double units;    /* the model's size over that of the solids' file: 1 if units are right */
 } judge_truth;
 
-/* Ends the program where anything fails. */
+/* Ends the program on any error. */
 judge_truth judge_make(const char *model, const judge_question *question);
 void judge_free(judge_truth *truth);
 
@@ -57,12 +57,11 @@ typedef struct judge_triangle {
 judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, size_t *count, double low[3],
                                      double high[3]);
 
-/* Where a texel's centre lies, and the smooth normal there (which may be NULL); column and row end in a half.
- */
+/* Position and smooth normal (may be NULL) of a texel's centre; column and row end in a half. */
 void judge_position(const judge_triangle *t, double column, double row, double size, double at[3],
                     double n[3]);
 
-/* A model with its lightmap's UVs (-1: the set that a bake takes), and what of it is solid. */
+/* A model with its lightmap's UVs (-1: the default set) and its solids. */
 typedef struct judge_scene {
     vsh_model *model;
     vsh_mesh *meshes;
@@ -70,12 +69,12 @@ typedef struct judge_scene {
     judge_triangle *triangles;
     size_t count;
     truth_mesh *traced, *solids, *rooms, *hollows; /* the last two may be NULL */
-    bool unknown; /* no file says what is solid: the first face that a ray meets decides */
+    bool unknown; /* no file of solids: the first face that a ray meets decides */
     double lift;  /* of rays' origins along the face's normal */
     double solid_scale;
 } judge_scene;
 
-/* Ends the program where anything fails. `lift` is a share of the model's size. */
+/* Ends the program on any error. `lift` is a share of the model's size. */
 judge_scene judge_open(const char *model, const char *solids, int32_t uv_set, double lift);
 void judge_close(judge_scene *scene);
 
@@ -93,10 +92,10 @@ typedef struct judge_shape {
 /* "v" and "f" of an OBJ with convex faces, which are cut into fans: the faces of objects "KIND:…" only. */
 judge_shape judge_read_solids(const char *path, const char *kind);
 
-/* `vsh_judge seen`, of its arguments (judge_seen.c); returns the exit code. */
+/* Runs `vsh_judge seen` (judge_seen.c); returns the exit code. */
 int judge_seen(int count, char **arguments);
 
 _Noreturn void judge_give_up(const char *what, const char *why);
 
-/* Bytes, or the end of the program. */
+/* Allocates zeroed bytes, or ends the program. */
 void *judge_take(size_t bytes);

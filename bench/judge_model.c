@@ -1,4 +1,4 @@
-/* Reads what judge_truth.c traces: a model's triangles in the world, and what of it is solid. */
+/* Reads a model's triangles in world space, and its solids. */
 #include "judge.h"
 
 #include <math.h>
@@ -128,7 +128,7 @@ judge_triangle *judge_take_triangles(const vsh_mesh *meshes, size_t mesh_count, 
     return triangles;
 }
 
-/* --- what is solid: "v" and "f" of an OBJ with convex faces, which are cut into fans */
+/* --- solids: "v" and "f" of an OBJ; convex faces become fans */
 
 judge_shape judge_read_solids(const char *path, const char *kind) {
     FILE *file = fopen(path, "r");
@@ -151,7 +151,7 @@ judge_shape judge_read_solids(const char *path, const char *kind) {
             }
         }
         if (line[0] == 'o') {
-            wanted = strncmp(line + 2, kind, strlen(kind)) == 0; /* of the others only the size counts */
+            wanted = strncmp(line + 2, kind, strlen(kind)) == 0; /* other objects only count for the size */
         } else if (line[0] == 'v') {
             float *p = s.positions + 3 * s.vertices++;
             if (sscanf(line + 1, "%f %f %f", &p[0], &p[1], &p[2]) != 3) {

@@ -23,7 +23,7 @@
 
 enum { POINTS = 200000, RAYS = 128, SURE_RAYS = 4096, SHADOW = 0, AO = 1, CHANNELS = 2 };
 static const double LIFT = 1e-5;  /* of the model's size */
-static const double WRONG = 0.25; /* an error that is seen at a glance */
+static const double WRONG = 0.25; /* visible at a glance */
 static const double WIDE = 4.0;   /* texels */
 static const double PI = 3.14159265358979323846;
 
@@ -54,7 +54,7 @@ static double dot(const double a[3], const double b[3]) {
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/* In 0 … 1, by counters: the finaliser of SplitMix64. */
+/* Random number in 0 … 1 from counters: the finaliser of SplitMix64. */
 static double random_number(uint64_t index, uint64_t use) {
     uint64_t z = (64 * index + use + 1) * 0x9e3779b97f4a7c15u;
     z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
@@ -242,7 +242,7 @@ static double look_up(const task *t, const float *plane, double u, double v) {
 }
 
 /* The answer of `rays` rays, spread by Vogel's spiral (directions.c) with a random turn and random radii. NAN
- * where none is above the face. */
+ * if no ray is above the face. */
 static double trace(const task *t, int channel, size_t i, const double start[3], const double g[3],
                     const truth_frame *frame, size_t rays, uint64_t set) {
     const double turn = random_number(i, 3 + 4 * set + 2 * (uint64_t)channel);
@@ -266,7 +266,7 @@ static double trace(const task *t, int channel, size_t i, const double start[3],
                              : (double)NAN;
 }
 
-/* Whether the sun's disc is on one side of both the face and the smooth normal's horizon. */
+/* True if the sun's disc is on one side of both horizons, the face's and the smooth normal's. */
 static bool is_clear_of_horizons(const task *t, const double g[3], const double n[3]) {
     const double limit = sin(t->half_angle), face = dot(t->sun.n, g), smooth = dot(t->sun.n, n);
     return dot(g, n) > 1.0 - 1e-6 || fmin(face, smooth) > limit || fmax(face, smooth) < -limit;
@@ -303,7 +303,7 @@ static void judge_points(void *user, size_t begin, size_t end) {
     }
 }
 
-/* --- what is reported */
+/* --- report */
 
 static void report(const task *t, int channel, const char *name, bool list) {
     size_t count[2] = {0}, dark[2] = {0}, bright[2] = {0}; /* [wide]: all points, points on wide charts */

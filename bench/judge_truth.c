@@ -1,6 +1,6 @@
-/* Truth of a model's lightmap at the texels' centres, by Embree's rays against the triangles as they are. AO
- * is over the hemisphere of the smooth normal. Directions below the face count neither as open nor as hidden.
- * A file of its own says what is solid: its faces look to the air.
+/* Computes the truth of a model's lightmap at texel centres, by Embree rays against its triangles. AO is over
+ * the hemisphere of the smooth normal. Directions below the face count neither as open nor as hidden.
+ * A separate file has the solids; their faces look outwards.
  *
  *   vsh_judge truth MODEL SIZE X,Y,Z DEGREES DISTANCE RAYS[:N] SOLIDS.obj|- OUT.exr
  *       verdict, shadow, ao, apart and triangle of every texel, or of one in N (judge.h) */
@@ -14,11 +14,11 @@
 #include <string.h>
 #include <vdbshade/vdbshade.h>
 
-/* Shares of rays that meet backs. Where no file says what is solid, open meshes are judged more strictly. */
+/* Shares of rays that meet backs. Without a file of solids, open meshes are judged more strictly. */
 static const double FEW = 0.2, MOST = 0.8, FEW_OF_MODEL = 0.05;
 static const double BORDER = 1e-3; /* texels */
-static const double LIFT = 1e-6;   /* of the model's size: some of Embree's roundings */
-static const double TOUCH = 6.0;   /* lifts: solids so near to each other touch */
+static const double LIFT = 1e-6;   /* share of the model's size: several rounding errors of Embree */
+static const double TOUCH = 6.0;   /* lifts: closer solids touch */
 enum { VERDICT_RAYS = 96, FIRST_RAYS = 64 };
 static const double PI = 3.14159265358979323846;
 
@@ -60,19 +60,19 @@ bool judge_hidden(const judge_scene *scene, const double from[3], const double t
 typedef struct gathering {
     struct RTCIntersectContext context; /* first: Embree hands on its address */
     const double *along;
-    bool against; /* a face looks straight against `along` */
-    int backs;    /* less fronts, on the way along */
+    bool against; /* a face is opposite to `along` */
+    int backs;    /* minus fronts, along the ray */
 } gathering;
 
-/* Looks at every face on a ray's way. */
+/* Visits every face along a ray. */
 static void gather(const struct RTCFilterFunctionNArguments *arguments) {
     gathering *g = (gathering *)(void *)arguments->context;
     const struct RTCHit *hit =
-        (const struct RTCHit *)arguments->hit; /* N is 1: packed as a lone hit's fields */
+        (const struct RTCHit *)arguments->hit; /* with N = 1 the layout is that of RTCHit */
     const double n[3] = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
     const double cosine = dot(n, g->along) / sqrt(dot(n, n));
     g->against = g->against || cosine < -0.99;
-    g->backs += cosine > 0.0 ? 1 : -1; /* Embree's normals look to where a triangle is anticlockwise */
+    g->backs += cosine > 0.0 ? 1 : -1; /* Embree's normals face the anticlockwise side */
     arguments->valid[0] = 0;
 }
 
@@ -85,7 +85,7 @@ static gathering all_on(const truth_mesh *mesh, const double from[3], const doub
     return seen;
 }
 
-/* How far a ray comes, and whether it meets a back there. */
+/* Distance to the first hit, and whether it is a back. */
 static double first_on(const truth_mesh *mesh, const double from[3], const double towards[3], bool *back) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);
@@ -98,9 +98,8 @@ static double first_on(const truth_mesh *mesh, const double from[3], const doubl
     return (double)r.ray.tfar;
 }
 
-/* Whether a ray says that it begins within a solid, which it leaves more often than it enters (solids may lie
- * within and across each other), or behind the wall of a room. Where two walls lie in one place, back to
- * back, the one that looks at us is seen. */
+/* True if a ray begins inside a solid, which it leaves more often than it enters (solids may overlap), or
+ * behind the wall of a room. Of two coincident walls, back to back, the one that faces the ray counts. */
 static bool is_behind(const judge_scene *s, const double from[3], const double towards[3], bool hollows) {
     bool back, unused;
     if (s->unknown) {
@@ -127,7 +126,7 @@ static bool is_behind(const judge_scene *s, const double from[3], const double t
     return all_on(s->rooms, before, towards, 2.0 * near).backs > 0;
 }
 
-/* Whether a solid or room ends where another begins: a face that looks against this one lies within TOUCH. */
+/* True if a solid or room touches another: an opposite face lies within TOUCH. */
 static bool touches(const judge_scene *s, const double at[3], const double g[3]) {
     const double near = TOUCH * s->lift / s->solid_scale;
     double under[3];

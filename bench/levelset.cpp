@@ -1,6 +1,5 @@
-// Measures the time to make a mesh a level set of 512 voxels and that a field, beside OpenVDB's meshToVolume
-// of the same triangles. Milliseconds of one thread's processor time; the ratio is OpenVDB's to ours. An
-// exception ends the program.
+// Times the level set of a mesh with 512 voxels, its field, and OpenVDB's meshToVolume for the same
+// triangles. Milliseconds of processor time of one thread; the ratio is OpenVDB's time over ours.
 //
 //   vsh_levelset FILE.csv
 #include "common.h"

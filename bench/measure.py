@@ -49,8 +49,8 @@ def median(function, *arguments, runs=5, **options):
     return statistics.median(seconds), result
 
 
-# --- features: the cost of each feature of a bake. Options of features that are off must add nothing. The cloister at 512² and
-# 256 voxels, each row in a process of its own.
+# --- features: the cost of each feature of a bake. Options of disabled features must cost nothing. The cloister at 512² and
+# 256 voxels, each row in a new process.
 
 ADAPTIVE, EXACT = dict(method="adaptive", max_error=0.02), dict(method="exact", max_error=0.02)
 IDLE = dict(ao_method="rays", ao_cones=256, rays=4096, max_error=1e-4, ao_distance=1000.0)
@@ -69,7 +69,7 @@ def status_bytes(key):
 
 
 def feature(name):
-    """One row, in a process of its own."""
+    """One row, measured in a new process."""
     options = dict(dict(lights=[sun()], method="cone", ao_distance=AO_DISTANCE, run=ONE), **FEATURES[name])
     charts_options = {key: options.pop(key) for key in ("padding", "supersample") if key in options}
     meshes = v.Model(ASSETS / "cloister.glb")
@@ -95,8 +95,7 @@ def features():
         yield [name, f"{tree:.5f}", f"{texels:.5f}", f"{bake:.5f}", f"{bake / rows[0][3]:.3f}", *rest]
 
 
-# --- scaling: seconds of the stages over texels, lights, voxels, triangles and threads, and the exponents of straight lines through
-# their logarithms
+# --- scaling: seconds of the stages over texels, lights, voxels, triangles and threads, and the exponents of fitted power laws
 
 STAGES = dict(voxelize="#8a5a00", field="#c28f2c", tree="#888888", texels="#5b8c5a", shadow="#1f5fa8", ao="#a83279", exact="#d1495b")
 
@@ -163,7 +162,7 @@ def plot_scaling(path):
     figure.savefig(path.removesuffix(".csv") + ".svg")
 
 
-# --- read: files parsed by a reader and in the process itself, and meshes of a million triangles by Assimp, in turn
+# --- read: files parsed in a reader and in the process itself, and meshes of a million triangles by Assimp
 
 def processor():
     """Seconds of this process and of its children."""
@@ -243,8 +242,8 @@ def read():
                    *([f"{assimp[0][0]:.2f}", f"{reader / assimp[0][0]:.2f}"] if million else ["", ""])]
 
 
-# --- proofs: points whose light a cone has certified as fully seen or fully hidden, checked by rays against the triangles. Points
-# where a wider light is not certified get more rays: wrong proofs would be there first.
+# --- proofs: points whose light a cone proved fully lit or dark, checked by rays against the triangles. Points where a wider light is
+# not proved get more rays, because wrong proofs are most likely there.
 
 POINTS, RAYS, MORE_RAYS, WIDER, LIFT = 80000, 256, 4096, 1.3, 1e-5
 LIGHTS = {"sun 5": ((-0.5, 0.8, -0.6), 5.0), "narrow 0.5": ((0.3, 0.7, 0.45), 0.5), "wide 30": ((0.2, 0.9, -0.3), 30.0),
@@ -276,7 +275,7 @@ def truth_of(meshes):
 
 
 def points_on(meshes, field, seed):
-    """Positions and normals on triangles, in runs of 64 near to each other. The field has them outside of solids."""
+    """Positions and normals on triangles, in groups of 64 neighbours, outside solids."""
     corners, random = numpy.concatenate([corners_of(mesh) for mesh in meshes]), numpy.random.default_rng(seed)
     normals = numpy.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = numpy.linalg.norm(normals, axis=1)
@@ -290,7 +289,7 @@ def points_on(meshes, field, seed):
 
 
 def over_horizon(light, at, up):
-    """Whether a part of the light is over the points' horizon: the others are dark by that, and prove nothing."""
+    """Whether a part of the light is above the points' horizon. Other points are dark without a proof."""
     directional = light.type == "directional"
     to = numpy.broadcast_to(light.direction, at.shape) if directional else numpy.array(light.position) - at
     length = numpy.linalg.norm(to, axis=1)
@@ -299,7 +298,7 @@ def over_horizon(light, at, up):
 
 
 def proved(occluders, at, up, light):
-    """Values, and where they have no error left: what is proved."""
+    """Values, and which of them are proved: those without a remaining error."""
     deviation = numpy.empty(len(at), numpy.float32)
     values = v.shade_shadow(occluders, at, up, light, deviation=deviation, method="exact", rays=8, max_error=1.0)
     return values, (deviation == 0) & over_horizon(light, at, up)
@@ -325,13 +324,13 @@ def proofs():
                 yield [scene, resolution, name, len(at), sure.sum(), (values[sure] == 1).sum(), near.sum(), wrong]
 
 
-# --- cancel: processor time from the callback's answer to the call's return, in every stage of every long call, at four fractions
+# --- cancel: processor time from the cancelling callback to the call's return, in every stage of every long call, at four fractions
 
 FRACTIONS = (0.0, 0.1, 0.5, 0.99)
 
 
 class Watch:
-    """Asks to stop at a fraction of a stage, which are counted as they begin."""
+    """Cancels at a fraction of the Nth stage."""
 
     def __init__(self, stage=-1, fraction=0.0):
         self.wanted, self.fraction = stage, fraction
@@ -347,7 +346,7 @@ class Watch:
 
 
 def long_calls():
-    """Calls by their names; casters at 256 voxels, lightmaps and pictures of 512²."""
+    """Calls by name; casters at 256 voxels, lightmaps and pictures of 512²."""
     meshes, voxels = v.Model(ASSETS / "cloister.glb"), dict(resolution=256)
     grid = v.Grid.from_meshes(meshes, **voxels)
     size, marched, traced = dict(width=512, height=512), v.Occluders.from_grid(grid, reach=2.0), v.Occluders(meshes, reach=2.0, **voxels)
@@ -399,8 +398,8 @@ def cancel():
             yield [name, title, *row]
 
 
-# --- seams: how far values on both sides of charts' borders differ if the surface is smooth, as bilinear lookups give them (docs/unwrap.md):
-# Lightmaps are of many rays, as baked, and stitched; "off" is the error of the lookups against rays from these very places.
+# --- seams: differences of bilinear lookups on both sides of chart borders on smooth surfaces (docs/unwrap.md). Lightmaps have many
+# rays, with and without stitching. "off" is the error of the lookups against rays from the same places.
 
 def edges_of(mesh):
     """Edges of triangles, the lower end first, world units: (3 n, 2 ends, x y z | normal | uv)."""
@@ -416,7 +415,7 @@ def edges_of(mesh):
 
 
 def seam_places(meshes, size, step=0.25):
-    """Places along all edges that exactly two triangles meet at, smoothly and apart in the lightmap: (n, 2 sides, x y z | normal | uv)."""
+    """Places along smooth edges of two triangles that are apart in the lightmap: (n, 2 sides, x y z | normal | uv)."""
     edges = numpy.concatenate([edges_of(mesh) for mesh in meshes])
     _, edge, counts = numpy.unique(edges[:, :, :3].reshape(-1, 6), axis=0, return_inverse=True, return_counts=True)
     edge = edge.reshape(-1)
@@ -475,10 +474,10 @@ def seams(truth_rays=1024):
                         yield [asset, size, channel, what, len(places), *(f"{rank:.6f}" for rank in ranks), f"{seconds:.3f}"]
 
 
-# --- calls: what a call costs from Python, beside the same call from C (tests/python/points.c), in turn
+# --- calls: time of a call from Python and of the same call from C (tests/python/points.c)
 
 def nanoseconds(function, calls=20000):
-    """Of one call: the median of five runs."""
+    """Median seconds of one call over five runs."""
     return statistics.median(timed(lambda: [function() for _ in range(calls)])[0] for _ in range(5)) / calls * 1e9
 
 

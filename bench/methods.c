@@ -1,6 +1,6 @@
 /* Error and time of every method at points: the seeds' scene against analytic rays, and valid texels of the
- * sample asset against Embree's rays. One core; medians of runs. "Embree rays" are how many of Embree's rays
- * take the same time, in whichever way of tracing is the fastest (rtcOccluded1, 8, 16).
+ * sample asset against Embree's rays. One core; medians of runs. "Embree rays" is the number of Embree rays
+ * that take the same time, traced in the fastest way (rtcOccluded1, 8, 16).
  *
  *   vsh_methods FILE.csv */
 #include "analytic.h"
@@ -43,7 +43,7 @@ static void write_header(FILE *csv) {
            "Embree rays", "rmse", "penumbra", "bias", "p99", "max");
 }
 
-/* One row: scene, what, µs a texel, samples a texel, times an outside measure, error against truth. */
+/* Prints one row: scene, method, µs and samples a texel, number of Embree rays, error. */
 static void write_row(FILE *csv, const char *scene, const char *what, double microseconds, double samples,
                       double embree_rays, const truth_metrics *e) {
     fprintf(csv, "%s,%s,%.4f,%.1f,%.2f,%.5f,%.5f,%.5f,%.4f,%.4f\n", scene, what, microseconds, samples,
@@ -83,7 +83,7 @@ static vsh_occluders *make_occluders(const vsh_field *field, const vshi_triangle
     return occluders;
 }
 
-/* A row for each method that marches one ray or cone. `ray`: seconds of an Embree ray, or 0. */
+/* Prints a row for each method that marches one ray or cone. `ray`: seconds of an Embree ray, or 0. */
 static void measure_methods(FILE *csv, const char *scene, const vsh_occluders *occluders,
                             const vsh_points *points, const vsh_light *light, double ray, const float *truth,
                             const float *valid, float *values) {
@@ -103,7 +103,7 @@ static void measure_methods(FILE *csv, const char *scene, const vsh_occluders *o
 
 enum { SIDE = 512, TILE = 8, SEEDS_RAYS = 256 };
 
-/* Texels of the floor in tiles, each in Morton's order, as a lightmap's samples are. */
+/* Texels of the floor in the order of a lightmap's samples: tiles, each in Morton order. */
 static void place_seeds_texels(double *positions, float *normals) {
     size_t i = 0;
     for (int tile = 0; tile < (SIDE / TILE) * (SIDE / TILE); ++tile) {
@@ -180,7 +180,7 @@ static double seconds_of(const truth_mesh *mesh, int packing, const truth_questi
     return median(seconds, (size_t)runs);
 }
 
-/* The fastest way for a number of rays: few rays of a point do not fill a packet. */
+/* Finds the fastest way for a number of rays: few rays of a point do not fill a packet. */
 static int fastest(const truth_mesh *mesh, const truth_question *question, int runs, double *least,
                    double each[TRUTH_PACKINGS], float *values) {
     int best = 0;
@@ -225,7 +225,8 @@ static double measure_embree(FILE *csv, const char *scene, const truth_mesh *mes
 
 enum { SIZE = 1024, RESOLUTION = 512, STRIDE = 4, LIGHT_RAYS = 512, AO_RAYS = 4096, AO_RUNS = 3 };
 
-/* Truth's rays begin this far above the surface, of the asset's size: enough for Embree's floats. */
+/* Height of the truth's origins above the surface, as a share of the asset's size: enough for Embree's
+ * floats. */
 static const double LIFT = 1e-5;
 static const double SUN[3] = {-0.5, 0.8, -0.6};
 static const double SUN_ANGLE = 5.0 * 3.14159265358979323846 / 180.0;
@@ -234,18 +235,17 @@ static const double AO_DISTANCE = 0.6;
 typedef struct receiver {
     size_t count;
     double *positions; /* on the surface */
-    double *lifted;    /* where a bake's rays begin */
-    double *origins;   /* of the truth's rays */
+    double *lifted;    /* origins of a bake's rays */
+    double *origins;   /* origins of the truth's rays */
     float *normals;
     float *valid;
 } receiver;
 
-/* A bake's rays begin a voxel above the surface where it is nearer than CREASE to another surface there, and
- * a sample is not shaded at all where it is nearer than CLEAR (src/lightmap/origins.c); voxels. */
+/* Voxels. As in src/lightmap/origins.c, rays begin a voxel above the surface if another surface is closer
+ * than CREASE, and samples closer than CLEAR are not shaded. */
 static const double CREASE = 0.75, CLEAR = 0.25;
 
-/* Every STRIDE-th sample in both directions of the tiles, so that the truth takes a minute and not an hour.
- */
+/* Every STRIDE-th sample in both directions, so that the truth takes a minute, not an hour. */
 static receiver take_texels(const vsh_field *field, const vsh_charts *charts) {
     vsh_error error;
     vshi_texels *texels;

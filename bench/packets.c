@@ -42,7 +42,7 @@ static axes axes_of(const float *normal) {
     return a;
 }
 
-/* Direction of ray i at a point, whose frame is given for AO; false below the point's horizon. */
+/* Direction of ray i at a point; AO needs its frame. Returns false below the point's horizon. */
 static inline bool direct(const work *job, const axes *frame, size_t point, size_t i, float d[3]) {
     const float *l = &job->locals[3 * i];
     if (job->question->towards == NULL) {
@@ -63,7 +63,7 @@ typedef struct packet {
     int used;
 } packet;
 
-/* The rays that were added are traced, and those that are free counted. */
+/* Traces the added rays and counts free ones. */
 static void flush(const work *job, packet *p, size_t first, size_t free_rays[TRUTH_AT_ONCE]) {
     struct RTCIntersectContext context;
     rtcInitIntersectContext(&context);

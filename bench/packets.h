@@ -1,12 +1,11 @@
-/* Embree as a yardstick: rays as those of truth_mesh_light() and truth_mesh_ao(), traced in each way that
- * could be the fastest. The values may differ from truth's by single rays, as packets and lone rays take
- * other code. */
+/* Measures Embree: traces the rays of truth_mesh_light() and truth_mesh_ao() in each way that could be the
+ * fastest. Values may differ from the truth by single rays, because packets and single rays use other code.
+ */
 #pragma once
 
 #include "embree.h"
 
-/* rtcOccluded1; packets of 8 and 16 rays of one point; packets of one ray of 8 and 16 points that follow each
- * other. */
+/* rtcOccluded1; packets of 8 and 16 rays of one point; packets of one ray of 8 and 16 successive points. */
 enum {
     TRUTH_LONE_RAYS,
     TRUTH_POINT_8,
@@ -29,7 +28,7 @@ typedef struct truth_question {
     size_t rays;
 } truth_question;
 
-/* Answers [count], 0 dark … 1; `threads` 0: all cores. Returns 0, or -1 where threads, memory or Embree are
- * short. */
+/* Answers [count], 0 dark … 1; `threads` 0: all cores. Returns 0, or -1 without enough threads or memory,
+ * or without Embree. */
 int truth_mesh_packets(const truth_mesh *truth, int packing, const truth_question *question, int threads,
                        float *values);
