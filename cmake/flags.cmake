@@ -34,11 +34,9 @@ function(vsh_set_source_flags target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:C>:-Wconversion -Wno-sign-conversion>)
 endfunction()
 
-# Callers may have stacks of 128 KiB, so frames are small. Kernels need more and run in vshi_on_stack() (src/base/threads.h).
-set(VSH_LARGEST_FRAME 24576)
-file(GLOB VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/shade/*.c)
-list(APPEND VSH_LARGE_FRAMES ${PROJECT_SOURCE_DIR}/src/lightmap/volume.c ${PROJECT_SOURCE_DIR}/src/field/level.c)
-set_source_files_properties(${VSH_LARGE_FRAMES} PROPERTIES COMPILE_OPTIONS -Wno-frame-larger-than)
+# Callers have stacks of 1 MiB.
+set(VSH_LARGEST_FRAME 262144)
+set_source_files_properties(${PROJECT_SOURCE_DIR}/src/shade/shadow_rays.c PROPERTIES COMPILE_OPTIONS -Wno-frame-larger-than)
 function(vsh_limit_frames target)
   if(NOT VSH_SANITIZE)
     target_compile_options(${target} PRIVATE $<$<AND:$<COMPILE_LANGUAGE:C>,$<CONFIG:Release>>:-Wframe-larger-than=${VSH_LARGEST_FRAME}>)

@@ -32,8 +32,7 @@
  *   library knows.
  * - Calls compute in the default floating-point environment (round to nearest, denormals kept, no traps) and
  *   restore the caller's. Callbacks run in the default one.
- * - Every call works on a stack of 128 KiB, of a thread or a fibre. With less than 2 MiB left it runs on
- *   threads of its own, which adds up to a millisecond. Callbacks then come from those threads.
+ * - Call from threads, or fibres, with a stack of at least 1 MiB.
  * - Libraries that parse .vdb files, meshes, images and fonts can crash on damaged ones. With vsh_run.reader
  *   they run in a confined child process, and the caller checks everything that comes back. posix_spawn()
  *   starts the child, so this is safe in hosts with threads and locks. Without a reader, read only files

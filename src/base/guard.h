@@ -4,7 +4,6 @@
 
 #include "base/error.h"
 #include "base/floats.h"
-#include "base/threads.h"
 
 #include <exception>
 #include <new>
@@ -30,7 +29,7 @@ void require(Function *function, const Arguments &...arguments) {
 // Returns the result of body(), or VSH_OK where it returns nothing. Exceptions become VSH_ERROR_MEMORY or
 // `code`, prefixed by `what`.
 template <typename Body>
-vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &body) noexcept {
+vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
     VSHI_FLOATS;
     try {
         if constexpr (std::is_void_v<decltype(body())>) {
@@ -48,14 +47,6 @@ vsh_result catch_all(vsh_error *error, vsh_result code, const char *what, Body &
     } catch (...) {
         return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: unknown exception", what);
     }
-}
-
-// The same, with enough stack for what body() calls. That may take another thread.
-template <typename Body>
-vsh_result guard(vsh_error *error, vsh_result code, const char *what, Body &&body) noexcept {
-    auto run = [&] { return catch_all(error, code, what, body); };
-    const auto call = [](void *user, vsh_error *) { return (*static_cast<decltype(run) *>(user))(); };
-    return vshi_on_stack(call, &run, error);
 }
 
 } // namespace vshi

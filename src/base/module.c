@@ -84,14 +84,12 @@ static vsh_result load(vshi_module *module, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result load_once(void *user, vsh_error *error) {
-    vshi_module *module = user;
+vsh_result vshi_module_load(vshi_module *module, vsh_error *error) {
+    if (vshi_module_table(module) != NULL) {
+        return VSH_OK;
+    }
     pthread_mutex_lock(&module->lock);
     const vsh_result result = vshi_module_table(module) == NULL ? load(module, error) : VSH_OK;
     pthread_mutex_unlock(&module->lock);
     return result;
-}
-
-vsh_result vshi_module_load(vshi_module *module, vsh_error *error) {
-    return vshi_module_table(module) != NULL ? VSH_OK : vshi_on_stack(load_once, module, error);
 }

@@ -1,7 +1,5 @@
-/* The threads that the system gives this process, and stacks that are large enough. */
+/* The threads that the system gives this process. */
 #pragma once
-
-#include "base/error.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -20,13 +18,5 @@ int32_t vshi_threads_given(int32_t wanted, size_t stack);
 
 /* Returns whether the system lets this process begin that many more threads now. */
 bool vshi_threads_left(int32_t wanted);
-
-/* Calls fn(user, error) and returns its result. If this thread has less than VSHI_STACK_ENOUGH left, a new
- * thread with VSHI_STACK makes the call. Hosts call from threads and fibres with small stacks, but TBB,
- * Embree, OpenVDB, our kernels and parsers of nested files need more. Signals go to other threads. Errors: as
- * fn, VSH_ERROR_MEMORY (the system refuses a thread). */
-enum { VSHI_STACK = 4 << 20 /* bytes, as TBB's threads have */, VSHI_STACK_ENOUGH = 2 << 20 };
-typedef vsh_result vshi_stack_fn(void *user, vsh_error *error);
-VSHI_SHARED vsh_result vshi_on_stack(vshi_stack_fn *fn, void *user, vsh_error *error);
 
 VSH_END_C

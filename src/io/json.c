@@ -4,7 +4,6 @@
 #include "base/bytes.h"
 #include "base/file.h"
 #include "base/memory.h"
-#include "base/threads.h"
 
 #include <errno.h>
 #include <stdarg.h>
@@ -320,30 +319,16 @@ static vsh_result read_all(const char *path, char **text, size_t *size, vsh_erro
                          : VSH_OK;
 }
 
-typedef struct reading {
-    vshi_json *reader;
-    size_t size;
-    vshi_read_fn *read;
-    void **made;
-} reading;
-
-static vsh_result read_file(void *user, vsh_error *error) {
-    const reading *r = user;
-    vshi_json *reader = r->reader;
+vsh_result vshi_json_read(vshi_json *reader, size_t size, vshi_read_fn *read, void **made) {
+    vsh_error *error = reader->error;
     char *text = NULL;
-    size_t size;
     vsh_result result;
-    VSHI_TRY_DONE(read_all(reader->path, &text, &size, error));
-    VSHI_TRY_DONE(vshi_check_limit(reader->run, vshi_json_bytes(text, size), reader->path, error));
+    *made = NULL;
+    VSHI_TRY_DONE(read_all(reader->path, &text, &reader->size, error));
+    VSHI_TRY_DONE(vshi_check_limit(reader->run, vshi_json_bytes(text, reader->size), reader->path, error));
     reader->text = text;
-    reader->size = size;
-    result = vshi_json_parse(reader, r->size, r->read, r->made);
+    result = vshi_json_parse(reader, size, read, made);
 done:
     free(text);
     return result;
-}
-
-vsh_result vshi_json_read(vshi_json *reader, size_t size, vshi_read_fn *read, void **made) {
-    *made = NULL;
-    return vshi_on_stack(read_file, &(reading){reader, size, read, made}, reader->error);
 }

@@ -7,7 +7,6 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/text.h"
-#include "base/threads.h"
 #include "io/image/image.h"
 #include "io/lit/work.h"
 
@@ -447,8 +446,7 @@ static vsh_result add_bakes(page *p, const writing *w, vsh_error *error) {
     return write_scripts(p, error);
 }
 
-static vsh_result write_page(void *user, vsh_error *error) {
-    const writing *w = user;
+static vsh_result write_page(const writing *w, vsh_error *error) {
     page p = {.path = w->path, .run = w->run};
     VSHI_TRY(vshi_lit_begin_stream(&p.file, w->path, error));
     p.to = p.file.to;
@@ -465,7 +463,7 @@ static vsh_result write_page(void *user, vsh_error *error) {
 vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, size_t count,
                                 const vshi_view_surface *surface, const vsh_run *run, vsh_error *error) {
     writing w = {path, bakes, count, surface, run};
-    return vshi_on_stack(write_page, &w, error);
+    return write_page(&w, error);
 }
 
 static vsh_result check_bake(const vsh_view_bake *given, const char *what, vsh_view_bake *bake,

@@ -106,6 +106,49 @@ TEST(every_stage_can_be_cancelled) {
     }
 }
 
+/* Jansson reads 2048 nested levels. */
+static vsh_result read_deep(const vsh_run *run, vsh_error *error) {
+    enum { LEVELS = 2000 };
+    vsh_scene *scene = NULL;
+    FILE *file = fopen("deep.json", "w");
+    assert_non_null(file);
+    fputs("{\"casters\": ", file);
+    for (int level = 0; level < 2 * LEVELS; ++level) {
+        fputc(level < LEVELS ? '[' : ']', file);
+    }
+    fputs("}", file);
+    fclose(file);
+    const vsh_result result = vsh_scene_read("deep.json", run, &scene, error);
+    unlink("deep.json");
+    return result == VSH_ERROR_INPUT ? VSH_OK : VSH_ERROR_INTERNAL;
+}
+
+static void *run_all(void *unused) {
+    static const scenario deep = {"deeply nested JSON", read_deep};
+    for (size_t i = 0; i <= scenario_count; ++i) {
+        const scenario *s = i < scenario_count ? &scenarios[i] : &deep;
+        vsh_error error;
+        vsh_run run = vsh_run_default();
+        run.threads = 1;
+        assert_that(s->run(&run, &error) == VSH_OK, "%s: %s", s->name, error.message);
+        scenarios_untouched(); /* no: it has written */
+    }
+    return unused;
+}
+
+TEST(every_scenario_runs_on_a_stack_of_a_mebibyte) {
+    pthread_attr_t attributes;
+    pthread_t thread;
+    if (VSHI_SANITIZED) { /* whose frames are larger */
+        skip();
+    }
+    assert_int_equal(pthread_attr_init(&attributes), 0);
+    assert_int_equal(pthread_attr_setstacksize(&attributes, 1 << 20), 0);
+    assert_int_equal(pthread_create(&thread, &attributes, run_all, NULL), 0);
+    assert_int_equal(pthread_join(thread, NULL), 0);
+    pthread_attr_destroy(&attributes);
+}
+
 int main(void) {
     return run_all_tests(scenarios_begin, scenarios_end);
 }

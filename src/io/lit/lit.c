@@ -5,7 +5,6 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/text.h"
-#include "base/threads.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -296,8 +295,7 @@ static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_er
     return vshi_lit_make_nodes(work, error);
 }
 
-static vsh_result write_all(void *user, vsh_error *error) {
-    vshi_lit_work *work = user;
+static vsh_result write_all(vshi_lit_work *work, vsh_error *error) {
     vshi_lit_besides besides = {NULL, 0};
     vshi_lit_uses uses = {.count = {0}};
     const int32_t place = work->options->image_place;
@@ -338,8 +336,7 @@ static vsh_result check_set(vshi_lit_work *work, size_t entry, vsh_error *error)
     return work->refused ? vshi_lit_fail_memory(work, error) : result;
 }
 
-static vsh_result check_sets(void *user, vsh_error *error) {
-    vshi_lit_work *work = user;
+static vsh_result check_sets(vshi_lit_work *work, vsh_error *error) {
     const bool gltf = work->model_path != NULL && vshi_is_gltf(work->model_path);
     for (size_t i = 0; gltf && i < vsh_model_mesh_count(work->model); ++i) {
         if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
@@ -395,7 +392,7 @@ static vsh_result process(const char *path, const vsh_model *model, const vsh_li
     if (work.gltf.job == NULL) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory"));
     }
-    VSHI_TRY_DONE(vshi_on_stack(output != NULL ? write_all : check_sets, &work, error));
+    VSHI_TRY_DONE(output != NULL ? write_all(&work, error) : check_sets(&work, error));
     if (output != NULL) {
         vshi_job_advance(work.gltf.job, 1); /* all is written: too late to stop */
     }

@@ -6,7 +6,6 @@
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/memory.h"
-#include "base/threads.h"
 #include "base/vec.h"
 #include "geometry/mesh.h"
 
@@ -399,8 +398,7 @@ typedef struct reading {
     vsh_model **model;
 } reading;
 
-static vsh_result read_file(void *user, vsh_error *error) {
-    const reading *r = user;
+static vsh_result read_file(const reading *r, vsh_error *error) {
     struct stat status;
     if (stat(r->path, &status) != 0) { /* before any complaint about the ending */
         return vshi_fail(error, VSH_ERROR_READ, "%s: %s", r->path, strerror(errno));
@@ -436,7 +434,7 @@ vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **mode
     VSHI_TRY(vshi_job_open(&job, &full, "load", READ_UNITS + REST_UNITS, path, error));
     reading r = {path, &full, job, model};
     vsh_result result;
-    VSHI_TRY_DONE(full.reader != NULL ? read_in_reader(&r, error) : vshi_on_stack(read_file, &r, error));
+    VSHI_TRY_DONE(full.reader != NULL ? read_in_reader(&r, error) : read_file(&r, error));
     result = vshi_job_step(job, REST_UNITS, error);
 done:
     vshi_job_end(job);
