@@ -40,12 +40,11 @@ VSH_API vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const
 VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
                                        const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
 
-/* Takes the active voxels of a grid of numbers (or a mask) in a .vdb file, with those of tiles, whatever its
- * transform. `name` NULL: the first such grid. Use run->reader for files from strangers. Errors:
+/* Takes the active voxels of a grid of numbers (or a mask) in a .vdb file, with those of tiles. `name` NULL: the first such grid. Use run->reader for files from strangers. Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_INPUT: no grids, none of that name, one without numbers (vectors, points, text) or active
- *   voxels, a voxel beyond ±2^28, a transform that is not finite;
+ *   voxels, a voxel beyond ±2^28, a transform that is not linear (a frustum) or not finite;
  * - VSH_ERROR_LIMIT: memory beyond run->memory_limit or the machine's;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run *run,
@@ -60,7 +59,7 @@ typedef struct vsh_voxels_info {
     int32_t index_max[3]; /* the other corner */
     double bounds_min[3]; /* world box of their centres */
     double bounds_max[3]; /* the other corner */
-    double voxel_size[3]; /* world units along the lattice's own axes; in the middle of a frustum */
+    double voxel_size[3]; /* world units along the lattice's own axes */
     int32_t has_normals;  /* 1: the band of a surface; 0: free space */
     uint64_t bytes;       /* in memory */
 } vsh_voxels_info;

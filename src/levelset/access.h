@@ -8,13 +8,6 @@
 
 VSH_BEGIN_C
 
-/* Samples a grid at world positions [count][3] into values[count]: interpolates between the eight voxels
- * around each, as renderers do. Without voxels there the value is the background. It is NaN for positions
- * that are not finite, or beyond ±2^31 voxels. Runs on the calling thread. Errors: VSH_ERROR_ARGUMENT (no
- * such grid). */
-vsh_result vshi_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
-                              float *values, vsh_error *error);
-
 /* Copies size[0] × size[1] × size[2] voxels from `index_min` on of a .vdb file's grid of numbers, or mask, x
  * fastest. `values` gets their values: the background for those that are not active. `active` gets 1 for
  * active ones, 0 for others. Either may be NULL. `name` is as of vsh_voxels_from_vdb(). Errors:
@@ -62,7 +55,7 @@ const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count);
 /* Number of the block with this origin, or SIZE_MAX. This and the next three functions are thread safe. */
 size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]);
 
-/* Longest axis of a voxel, world units; infinite if it varies. */
+/* Longest axis of a voxel, world units. */
 double vshi_voxels_longest_axis(const vsh_voxels *voxels);
 
 /* A ball that holds the centres of all voxels of a block. */

@@ -90,10 +90,6 @@ VSH_BEGIN_C
          (const vsh_volume *volume, size_t grid, const int32_t index_min[3], const int32_t size[3],          \
           float *values, vsh_error *error),                                                                  \
          (volume, grid, index_min, size, values, error), nothing)                                            \
-    MAKE(vshi_volume_sample,                                                                                 \
-         (const vsh_volume *volume, size_t grid, size_t count, const double *positions, float *values,       \
-          vsh_error *error),                                                                                 \
-         (volume, grid, count, positions, values, error), nothing)                                           \
     MAKE(vsh_volume_write,                                                                                   \
          (const vsh_volume *volume, const char *path, int32_t half, const vsh_attribute *attributes,         \
           size_t count, vsh_error *error),                                                                   \

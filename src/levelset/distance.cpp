@@ -63,7 +63,6 @@ class Voxelizer {
 
     FloatGrid::Ptr run(const Vec3d &low, const Vec3d &high) {
         grid = FloatGrid::create(float(band));
-        grid->setTransform(lattice.transform());
         Level level = start(low, high);
         while (level.size > 8) {
             level = split(level);
@@ -336,7 +335,7 @@ vsh_result from_distance(const vsh_distance *field, vsh_distances_fn *batch, con
             };
             level_set = redistance(*level_set, exact, lattice, 0.5, 1.0, stage);
         }
-        *grid = close_grid(level_set, 0.0, stage);
+        *grid = close_grid(level_set, lattice.matrix(), 0.0, stage);
     });
 }
 

@@ -39,23 +39,16 @@ Finding finding(Finding::Kind kind, const char *format, ...) {
     return {kind, text};
 }
 
-Finding examine_transform(const openvdb::math::Transform &transform) {
-    if (!transform.isLinear()) {
-        return finding(Finding::BAD,
-                       "its transform is a %s: only rotated, mirrored, moved and uniformly "
-                       "scaled grids can cast shadows",
-                       transform.mapType().c_str());
-    }
+} // namespace
+
+Finding examine_matrix(const Matrix &matrix) {
     Vec3d axes[3];
     double length[3];
     for (int i = 0; i < 3; ++i) {
-        Vec3d unit(0.0);
-        unit[i] = 1.0;
-        axes[i] = transform.baseMap()->applyJacobian(unit);
+        axes[i] = axis_of(matrix.data(), i);
         length[i] = axes[i].length();
     }
-    const Vec3d origin = transform.indexToWorld(Vec3d(0.0));
-    if (!std::isfinite(length[0] + length[1] + length[2] + origin.lengthSqr())) {
+    if (!std::isfinite(length[0] + length[1] + length[2] + axis_of(matrix.data(), 3).lengthSqr())) {
         return finding(Finding::BAD, "its transform holds values that are not finite");
     }
     const double low = std::min({length[0], length[1], length[2]});
@@ -79,8 +72,6 @@ Finding examine_transform(const openvdb::math::Transform &transform) {
     return {};
 }
 
-} // namespace
-
 Finding examine_kind(const openvdb::GridBase &grid) {
     if (!grid.isType<FloatGrid>() && !grid.isType<openvdb::DoubleGrid>()) {
         return finding(Finding::BAD, "it is a %s, expected a level set of floats or doubles",
@@ -90,11 +81,13 @@ Finding examine_kind(const openvdb::GridBase &grid) {
         return finding(Finding::BAD, "its class is '%s', expected 'level set'",
                        openvdb::GridBase::gridClassToString(grid.getGridClass()).c_str());
     }
-    return examine_transform(grid.transform());
-}
-
-double voxel_size(const openvdb::GridBase &grid) {
-    return grid.transform().baseMap()->applyJacobian(Vec3d(1.0, 0.0, 0.0)).length();
+    if (!grid.transform().isLinear()) {
+        return finding(Finding::BAD,
+                       "its transform is a %s: only rotated, mirrored, moved and uniformly "
+                       "scaled grids can cast shadows",
+                       grid.transform().mapType().c_str());
+    }
+    return examine_matrix(matrix_of(grid.transform()));
 }
 
 namespace {
@@ -278,9 +271,8 @@ Finding examine_tiles(const FloatTree &tree, float background) {
 
 } // namespace
 
-Finding examine_values(const FloatGrid &grid, Stage &stage) {
+Finding examine_values(const FloatGrid &grid, double voxel, Stage &stage) {
     const float background = grid.background();
-    const double voxel = voxel_size(grid);
     if (!std::isfinite(background) || background < 0.0f) {
         return finding(Finding::BAD, "background %g: outside must be positive", double(background));
     }
@@ -357,12 +349,10 @@ constexpr double AREA_PER_VOXEL = 0.6;
 
 constexpr double COPIES = 6.0; // of far inner nodes that exist at a time
 
-// True distances for an ODD grid: the same surface, signs and transform, and a band of 3 voxels or more. Its
-// errors do not name the file.
-FloatGrid::Ptr compute_distances(const FloatGrid &grid, Stage &stage) {
-    const double voxel = voxel_size(grid);
+// True distances for an ODD grid: the same surface and signs, and a band of 3 voxels or more. Its errors do
+// not name the file.
+FloatGrid::Ptr compute_distances(const FloatGrid &grid, double voxel, Stage &stage) {
     const double half_width = std::clamp(std::round(double(grid.background()) / voxel), 3.0, 100.0);
-    // Work is in index space; at the end the grid gets the source's transform.
     const Lattice lattice{voxel, half_width, 0.0, Vec3d(0.0)};
     const double count = double(grid.tree().leafCount());
     check_memory(stage.options, voxel, count,
@@ -396,9 +386,7 @@ FloatGrid::Ptr compute_distances(const FloatGrid &grid, Stage &stage) {
         openvdb::tools::dilateActiveValues(source->tree(), 1, openvdb::tools::NN_FACE_EDGE_VERTEX,
                                            openvdb::tools::PRESERVE_TILES);
     });
-    const FloatGrid::Ptr mended = redistance(*source, {}, lattice, 0.6, 1.0, stage);
-    mended->setTransform(grid.transform().copy());
-    return mended;
+    return redistance(*source, {}, lattice, 0.6, 1.0, stage);
 }
 
 } // namespace
@@ -413,7 +401,8 @@ vsh_grid *close_level_set(LevelSet &set, Stage &stage) {
     const std::string name = set.name.text();
     stage.check();
     check_bytes(stage.options, double(set.grid->memUsage()), name.c_str());
-    const Finding finding = examine_values(*set.grid, stage);
+    const double voxel = axis_of(set.matrix.data(), 0).length();
+    const Finding finding = examine_values(*set.grid, voxel, stage);
     refuse_bad(set.name, finding);
     if (finding.kind == Finding::NOTED) {
         vshi_warn(&stage.options, "%s: %s", name.c_str(), finding.text.c_str());
@@ -421,7 +410,7 @@ vsh_grid *close_level_set(LevelSet &set, Stage &stage) {
     if (finding.kind == Finding::ODD) {
         vshi_warn(&stage.options, "%s: %s: its distances were made anew", name.c_str(), finding.text.c_str());
         try {
-            set.grid = compute_distances(*set.grid, stage);
+            set.grid = compute_distances(*set.grid, voxel, stage);
         } catch (const Failure &failure) {
             if (failure.error.code != VSH_ERROR_CANCELLED) {
                 refuse(failure.error.code, "%s: %.700s", name.c_str(), failure.error.message);
@@ -429,7 +418,7 @@ vsh_grid *close_level_set(LevelSet &set, Stage &stage) {
             throw;
         }
     }
-    return close_grid(set.grid, set.shell, stage);
+    return close_grid(set.grid, set.matrix, set.shell, stage);
 }
 
 } // namespace vshi

@@ -15,7 +15,6 @@
 #include <openvdb/io/GridDescriptor.h>
 #include <openvdb/io/Stream.h>
 #include <sys/stat.h>
-#include <zlib.h>
 
 namespace vshi {
 
@@ -29,57 +28,6 @@ namespace {
 using openvdb::GridBase;
 using openvdb::MetaMap;
 using openvdb::io::GridDescriptor;
-
-// --- the stream that .vdb files are read from
-
-// Whether data begin as Zip data (RFC 1950): deflate, and a multiple of 31. zlib refuses others, which
-// OpenVDB notices.
-bool is_zip(const unsigned char *bytes, size_t size) {
-    return size > 2 && (bytes[0] & 15) == 8 && (bytes[0] * 256 + bytes[1]) % 31 == 0;
-}
-
-// Whether Zip data unpack to their end, with the right check sum.
-bool is_sound(unsigned char *bytes, size_t size) {
-    unsigned char unpacked[1 << 14];
-    z_stream stream{};
-    stream.next_in = bytes;
-    stream.avail_in = uInt(size);
-    if (inflateInit(&stream) != Z_OK) {
-        return false;
-    }
-    int result = Z_OK;
-    while (result == Z_OK) {
-        stream.next_out = unpacked;
-        stream.avail_out = sizeof unpacked;
-        result = inflate(&stream, Z_NO_FLUSH);
-    }
-    inflateEnd(&stream);
-    return result == Z_STREAM_END;
-}
-
-// Checks the sums (Adler-32, RFC 1950) of a file's Zip data as they are read. OpenVDB 10.0 ignores wrong sums
-// and continues with wrong values. The file gives a size in 8 bytes, then the data in one piece.
-struct CheckedFile final : std::filebuf {
-    bool damaged = false;
-
-  protected:
-    std::streamsize xsgetn(char *bytes, std::streamsize size) override {
-        const std::streamsize read = std::filebuf::xsgetn(bytes, size);
-        auto *data = reinterpret_cast<unsigned char *>(bytes);
-        if (read == size && size == announced && size < (std::streamsize(1) << 31) &&
-            is_zip(data, size_t(size))) {
-            damaged = damaged || !is_sound(data, size_t(size));
-        }
-        announced = 0;
-        if (read == size && size == std::streamsize(sizeof announced)) {
-            std::memcpy(&announced, bytes, sizeof announced);
-        }
-        return read;
-    }
-
-  private:
-    int64_t announced = 0; // the size that was read last
-};
 
 // --- the grids of a file
 
@@ -108,12 +56,11 @@ class GridReader final : public openvdb::io::Archive {
   private:
     void open();
     void list();
-    GridBase::Ptr read_tree(size_t i);
 
     uint64_t size = 0;
     // The stream keeps this pointer's address.
     openvdb::io::StreamMetadata::Ptr state = std::make_shared<openvdb::io::StreamMetadata>();
-    CheckedFile file;
+    std::filebuf file;
     std::istream stream{&file};
     std::vector<GridDescriptor> entries;
     std::vector<GridBase::Ptr> grids; // without trees, unless the file is streamed
@@ -228,15 +175,9 @@ GridBase::Ptr GridReader::without_tree(size_t i) {
 }
 
 GridBase::Ptr GridReader::grid(size_t i) {
-    const GridBase::Ptr read = streamed ? grids[i] : read_tree(i);
-    if (file.damaged) {
-        refuse(VSH_ERROR_READ, "%s: damaged: grid '%s': Zip data that do not fit their check sum", path,
-               name(i).c_str());
+    if (streamed) {
+        return grids[i];
     }
-    return read;
-}
-
-GridBase::Ptr GridReader::read_tree(size_t i) {
     const GridDescriptor &entry = entries[i];
     const GridBase::Ptr result = grids[i]->copyGrid();
     entry.seekToGrid(stream);
@@ -294,7 +235,7 @@ template <typename Wanted> size_t choose(GridReader &reader, const char *name, c
     refuse(VSH_ERROR_INPUT, "%s: no grid '%s'; it holds %.700s", reader.path, name, names.c_str());
 }
 
-// The grid as floats, without its metadata.
+// The grid as floats, without its metadata and transform.
 FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
     FloatTree::Ptr tree;
     if (grid->isType<openvdb::DoubleGrid>()) {
@@ -302,9 +243,7 @@ FloatGrid::Ptr to_floats(const GridBase::Ptr &grid) {
     } else {
         tree = openvdb::gridPtrCast<FloatGrid>(grid)->treePtr();
     }
-    const FloatGrid::Ptr floats = FloatGrid::create(tree);
-    floats->setTransform(restore_transform(describe_transform(grid->transform())));
-    return floats;
+    return FloatGrid::create(tree);
 }
 
 bool has_numbers(const GridBase &grid) {
@@ -368,7 +307,8 @@ void describe(GridReader &reader, size_t i, Stage &stage, vsh_vdb_entry &entry) 
             entry.background = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid)->background();
         }
         if (problem.empty()) {
-            const Finding finding = examine_values(*to_floats(grid), stage);
+            const double voxel = axis_of(matrix_of(grid->transform()).data(), 0).length();
+            const Finding finding = examine_values(*to_floats(grid), voxel, stage);
             problem = finding.text;
             entry.mended = finding.kind == Finding::ODD;
         }
@@ -438,11 +378,12 @@ Choice choose_level_set(GridReader &reader, const char *name) {
 LevelSet load_level_set(const char *path, const char *name, Stage &stage) {
     return read_file(path, stage.options, [&](GridReader &reader) {
         const Choice choice = choose_level_set(reader, name);
-        LevelSet loaded{{path, reader.name(choice.grid)}, nullptr, 0.0};
+        LevelSet loaded{{path, reader.name(choice.grid)}, nullptr, {}, 0.0};
         check_bytes(stage.options, reader.bytes(choice.grid), loaded.name.text().c_str());
         const GridBase::Ptr found = reader.grid(choice.grid);
         refuse_bad(loaded.name, examine_kind(*found));
         loaded.grid = to_floats(found);
+        loaded.matrix = matrix_of(found->transform());
         loaded.shell = shell_of(*found);
         if (!choice.others.empty()) {
             vshi_warn(&stage.options,
@@ -479,7 +420,6 @@ GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &ru
         check_bytes(run, reader.bytes(chosen), what.c_str());
         const GridBase::Ptr grid = reader.grid(chosen);
         check_bytes(run, double(grid->memUsage()), what.c_str());
-        grid->setTransform(restore_transform(describe_transform(grid->transform())));
         return grid;
     });
 }

@@ -21,23 +21,11 @@ struct GridName {
 struct LevelSet {
     GridName name;
     FloatGrid::Ptr grid;
+    Matrix matrix;
     double shell; // thickness of open meshes, world units; 0: none
 };
 
-// --- messages between a reader and its caller: transforms, level sets and voxels as plain arrays (read.cpp)
-
-// A transform: OpenVDB's name of its map, and the numbers that define the map. Files also hold numbers that
-// follow from those; in damaged files the two disagree.
-struct TransformData {
-    std::string map;
-    std::vector<double> numbers;
-};
-
-TransformData describe_transform(const openvdb::math::Transform &transform);
-
-// The transform that OpenVDB reads from a sound file with these numbers. Throws std::invalid_argument for an
-// unknown map, or a wrong count of numbers.
-openvdb::math::Transform::Ptr restore_transform(const TransformData &data);
+// --- messages between a reader and its caller: level sets and voxels as plain arrays (read.cpp)
 
 void encode_level_set(vshi_encoder *encoder, const LevelSet &set);
 
@@ -45,10 +33,10 @@ void encode_level_set(vshi_encoder *encoder, const LevelSet &set);
 // numbers that are not finite.
 LevelSet decode_level_set(vshi_decoder *decoder, const char *path);
 
-void encode_blocks(vshi_encoder *encoder, const std::string &grid, const openvdb::math::Transform &transform,
+void encode_blocks(vshi_encoder *encoder, const std::string &grid, const Matrix &matrix,
                    const std::vector<vshi_block> &blocks);
 std::vector<vshi_block> decode_blocks(vshi_decoder *decoder, const char *path, std::string &grid,
-                                      openvdb::math::Transform::Ptr &transform);
+                                      Matrix &matrix);
 
 // An answer of run.reader. It reports the reader's progress to a stage.
 class Answer {
@@ -84,11 +72,11 @@ struct Finding {
 // Examines class, type of values and transform, without the tree.
 Finding examine_kind(const openvdb::GridBase &grid);
 
-// Voxel size of a transform that examine_kind() found fine, world units.
-double voxel_size(const openvdb::GridBase &grid);
+// Examines the transform: voxels must be cubes of a size that OpenVDB can write.
+Finding examine_matrix(const Matrix &matrix);
 
-// Examines the tree's values.
-Finding examine_values(const FloatGrid &grid, Stage &stage);
+// Examines the tree's values; `voxel` is the voxel size, world units.
+Finding examine_values(const FloatGrid &grid, double voxel, Stage &stage);
 
 // Fails for a finding that is BAD.
 void refuse_bad(const GridName &name, const Finding &finding);
@@ -131,8 +119,8 @@ size_t list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entr
 constexpr double SMALLEST_WRITTEN = 1.45e-5;
 
 // A grid of ours: shares the tree.
-FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
-                          const std::string &name, openvdb::GridClass grid_class);
+FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const double *matrix, const std::string &name,
+                          openvdb::GridClass grid_class);
 
 // The same for a handle's level set.
 FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name);

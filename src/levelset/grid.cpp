@@ -53,11 +53,23 @@ vsh_grid_options resolve(const vsh_grid_options *given) {
 
 } // namespace
 
-// Restored as from a file, as OpenVDB cannot construct maps of the smallest voxels: it takes them for
-// singular.
-openvdb::math::Transform::Ptr Lattice::transform() const {
-    return restore_transform({openvdb::math::UniformScaleTranslateMap::mapType(),
-                              {translation[0], translation[1], translation[2], voxel, voxel, voxel}});
+Matrix Lattice::matrix() const {
+    return {voxel,          0.0, 0.0, translation[0], 0.0,           voxel, 0.0,
+            translation[1], 0.0, 0.0, voxel,          translation[2]};
+}
+
+Matrix matrix_of(const openvdb::math::Transform &transform) {
+    Matrix matrix{};
+    const Vec3d origin = transform.indexToWorld(Vec3d(0.0));
+    for (int column = 0; column < 4; ++column) {
+        Vec3d unit(0.0);
+        unit[column % 3] = 1.0;
+        const Vec3d axis = column < 3 ? transform.baseMap()->applyJacobian(unit) : origin;
+        for (int row = 0; row < 3; ++row) {
+            matrix[size_t(4 * row + column)] = axis[row];
+        }
+    }
+    return matrix;
 }
 
 Lattice make_lattice(const vsh_grid_options *given, const Vec3d &low, const Vec3d &high) {
@@ -145,18 +157,6 @@ void Stage::check() {
 
 namespace {
 
-void set_transform(vsh_grid_info &info, const openvdb::math::Transform &transform) {
-    const Vec3d origin = transform.indexToWorld(Vec3d(0.0));
-    for (int column = 0; column < 4; ++column) {
-        Vec3d unit(0.0);
-        unit[column % 3] = 1.0;
-        const Vec3d axis = column < 3 ? transform.baseMap()->applyJacobian(unit) : origin;
-        for (int row = 0; row < 3; ++row) {
-            info.transform[4 * row + column] = axis[row];
-        }
-    }
-}
-
 void set_bounds(vsh_grid_info &info, const openvdb::CoordBBox &voxels) {
     for (int row = 0; row < 3; ++row) {
         const double *r = info.transform + 4 * row;
@@ -199,15 +199,14 @@ Closed close_leaf(Leaf &leaf, float background, float voxel) {
 
 } // namespace
 
-vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage) {
+vsh_grid *close_grid(const FloatGrid::Ptr &level_set, const Matrix &matrix, double shell, Stage &stage) {
     auto grid = std::make_unique<vsh_grid>();
     grid->level_set = level_set;
     level_set->setGridClass(openvdb::GRID_LEVEL_SET);
     vsh_grid_info &info = grid->info;
     info = {};
-    set_transform(info, level_set->transform());
-    const double *m = info.transform;
-    info.voxel_size = std::sqrt(m[0] * m[0] + m[4] * m[4] + m[8] * m[8]);
+    std::copy(matrix.begin(), matrix.end(), info.transform);
+    info.voxel_size = axis_of(info.transform, 0).length();
     const float background = level_set->background();
 
     std::vector<Leaf *> leaves;
@@ -318,7 +317,9 @@ vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32
         const vshi::GridName name{"OpenVDB", given->getName()};
         vshi::refuse_bad(name, vshi::examine_kind(*given));
         vshi::check_bytes(full, double(given->memUsage()), name.text().c_str());
-        vshi::LevelSet set{name, given->deepCopy(), vshi::shell_of(*given)};
+        vshi::LevelSet set{
+            name, openvdb::FloatGrid::create(std::make_shared<openvdb::FloatTree>(given->constTree())),
+            vshi::matrix_of(given->transform()), vshi::shell_of(*given)};
         *grid = vshi::close_level_set(set, stage);
     });
 }

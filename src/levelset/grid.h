@@ -9,6 +9,7 @@
 #include "levelset/access.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <openvdb/Grid.h>
 #include <openvdb/openvdb.h>
@@ -20,8 +21,8 @@ extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
 extern template class openvdb::Grid<openvdb::FloatTree>;
 
 struct vsh_grid {
-    openvdb::FloatGrid::Ptr level_set; // never changed once the handle exists
-    vsh_grid_info info;
+    openvdb::FloatGrid::Ptr level_set; // in index space; never changed once the handle exists
+    vsh_grid_info info;                // with the transform to the world
 };
 
 namespace vshi {
@@ -33,6 +34,24 @@ using openvdb::Vec3d;
 using Leaf = FloatTree::LeafNodeType;
 using UpperNode = FloatTree::RootNodeType::ChildNodeType;
 using LowerNode = UpperNode::ChildNodeType;
+
+// From a grid's index space to the world: three rows of four. Grids themselves are kept in index space,
+// because OpenVDB takes maps of voxels below 1.44e-5 for singular, and adds rounding to others.
+using Matrix = std::array<double, 12>;
+
+inline Vec3d apply(const double *m, const Vec3d &p) {
+    return Vec3d(m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3],
+                 m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
+                 m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
+}
+
+// World axis of a voxel along index axis 0 … 2.
+inline Vec3d axis_of(const double *m, int axis) {
+    return Vec3d(m[axis], m[4 + axis], m[8 + axis]);
+}
+
+// The matrix of a linear transform.
+Matrix matrix_of(const openvdb::math::Transform &transform);
 
 // Throws a Failure.
 [[noreturn]] void refuse(vsh_result code, const char *format, ...) __attribute__((format(printf, 2, 3)));
@@ -90,7 +109,7 @@ struct Lattice {
     Vec3d world(const Coord &index) const { return index.asVec3d() * voxel + translation; }
     Vec3d index(const Vec3d &world) const { return (world - translation) / voxel; }
     float background() const { return float(half_width * voxel); }
-    openvdb::math::Transform::Ptr transform() const;
+    Matrix matrix() const;
 };
 
 // Checks the options and lays the lattice over the bounds. Indices beyond ±2^28 are refused.
@@ -152,7 +171,7 @@ class Stage {
 
 // Makes a handle of a level set. Values at or beyond the background become ± background and inactive, all
 // others active. `shell` is the thickness of open meshes in it, world units.
-vsh_grid *close_grid(const FloatGrid::Ptr &level_set, double shell, Stage &stage);
+vsh_grid *close_grid(const FloatGrid::Ptr &level_set, const Matrix &matrix, double shell, Stage &stage);
 
 // The box of a dense copy. Fails if it holds no voxel, or ends beyond the largest index.
 openvdb::CoordBBox box_to_copy(const int32_t index_min[3], const int32_t size[3]);

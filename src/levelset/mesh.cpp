@@ -386,7 +386,7 @@ vsh_grid *from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options
     if (sheets) {
         unite(united, fill_sheets(parts.sheets, lattice, progress, stage), stage);
     }
-    return close_grid(united, sheets ? lattice.shell * lattice.voxel : 0.0, stage);
+    return close_grid(united, lattice.matrix(), sheets ? lattice.shell * lattice.voxel : 0.0, stage);
 }
 
 } // namespace

@@ -13,127 +13,18 @@ namespace vshi {
 
 namespace {
 
-namespace math = openvdb::math;
-
-// --- transforms
-
-// A kind of transform: how many plain numbers OpenVDB writes, and how many of a scale behind them.
-struct Kind {
-    std::string map;
-    size_t plain, scale;
-};
-
-const Kind &kind_of(const std::string &map) {
-    static const std::vector<Kind> all{
-        {math::TranslationMap::mapType(), 3, 0},
-        {math::ScaleMap::mapType(), 0, 3},
-        {math::UniformScaleMap::mapType(), 0, 3},
-        {math::ScaleTranslateMap::mapType(), 3, 3},
-        {math::UniformScaleTranslateMap::mapType(), 3, 3},
-        {math::AffineMap::mapType(), 16, 0},
-        {math::UnitaryMap::mapType(), 16, 0},
-        {math::NonlinearFrustumMap::mapType(), 24, 0}, // the last 16 are of another map
-    };
-    const auto found =
-        std::find_if(all.begin(), all.end(), [&](const Kind &kind) { return kind.map == map; });
-    if (found == all.end()) {
-        throw std::invalid_argument("its transform is of no known kind");
-    }
-    return *found;
-}
-
-void add(std::vector<double> &numbers, const double *more, size_t count) {
-    numbers.insert(numbers.end(), more, more + count);
-}
-
-void write(std::ostream &out, const double *numbers, size_t count) {
-    out.write(reinterpret_cast<const char *>(numbers), std::streamsize(count * sizeof *numbers));
-}
-
-// Writes a scale, and the numbers that OpenVDB computes from it.
-void write_scale(std::ostream &out, const double *numbers) {
-    const Vec3d scale(numbers), inverse = 1.0 / scale;
-    const Vec3d size(std::fabs(scale[0]), std::fabs(scale[1]), std::fabs(scale[2]));
-    for (const Vec3d &member : {scale, size, inverse, Vec3d(inverse * inverse), Vec3d(inverse / 2.0)}) {
-        member.write(out);
-    }
-}
-
-} // namespace
-
-TransformData describe_transform(const math::Transform &transform) {
-    TransformData data{transform.mapType(), {}};
-    const Kind &kind = kind_of(data.map);
-    if (const auto frustum = transform.map<math::NonlinearFrustumMap>()) {
-        add(data.numbers, frustum->getBBox().min().asPointer(), 3);
-        add(data.numbers, frustum->getBBox().max().asPointer(), 3);
-        data.numbers.push_back(frustum->getTaper());
-        data.numbers.push_back(frustum->getDepth());
-        add(data.numbers, frustum->secondMap().getMat4().asPointer(), 16);
-        return data;
-    }
-    // Every other map first writes the numbers that define it, as doubles.
-    std::stringstream text;
-    transform.baseMap()->write(text);
-    data.numbers.resize(kind.plain + kind.scale);
-    text.read(reinterpret_cast<char *>(data.numbers.data()),
-              std::streamsize(data.numbers.size() * sizeof(double)));
-    return data;
-}
-
-math::Transform::Ptr restore_transform(const TransformData &data) {
-    initialize();
-    const Kind &kind = kind_of(data.map);
-    if (data.numbers.size() != kind.plain + kind.scale) {
-        throw std::invalid_argument("its transform has other numbers");
-    }
-    std::stringstream text;
-    openvdb::io::setCurrentVersion(text);
-    openvdb::writeString(text, data.map);
-    const double *numbers = data.numbers.data();
-    if (data.map == math::NonlinearFrustumMap::mapType()) {
-        write(text, numbers, 8);
-        openvdb::writeString(text, math::AffineMap::mapType());
-        write(text, numbers + 8, 16);
-    } else {
-        write(text, numbers, kind.plain);
-    }
-    if (kind.scale > 0) {
-        write_scale(text, numbers + kind.plain);
-    }
-    const auto transform = std::make_shared<math::Transform>();
-    transform->read(text);
-    return transform;
-}
-
-namespace {
-
-void encode_transform(vshi_encoder *encoder, const math::Transform &transform) {
-    const TransformData data = describe_transform(transform);
-    vshi_encode_text(encoder, data.map.c_str());
-    vshi_encode_array(encoder, data.numbers.data(), data.numbers.size(), sizeof(double));
-}
-
 [[noreturn]] void fail_answer(const char *path, const char *what) {
     Failure failure;
     vshi_answer_fail(path, what, &failure.error);
     throw failure;
 }
 
-math::Transform::Ptr decode_transform(vshi_decoder *decoder, const char *path) {
-    const char *map = vshi_decode_text(decoder, true);
-    TransformData data{map != nullptr ? map : "", {}};
-    try {
-        const Kind &kind = kind_of(data.map);
-        for (size_t i = 0; i < kind.plain + kind.scale; ++i) {
-            data.numbers.push_back(vshi_decode_number(decoder));
-        }
-        if (!decoder->bad) {
-            return restore_transform(data);
-        }
-    } catch (const std::invalid_argument &) {
+Matrix decode_matrix(vshi_decoder *decoder) {
+    Matrix matrix;
+    for (double &number : matrix) {
+        number = vshi_decode_number(decoder);
     }
-    fail_answer(path, "a transform");
+    return matrix;
 }
 
 // --- messages: level sets
@@ -233,7 +124,7 @@ void encode_level_set(vshi_encoder *encoder, const LevelSet &set) {
     const FloatTree &tree = set.grid->constTree();
     vshi_encode_text(encoder, set.name.grid.c_str());
     vshi_encode_number(encoder, set.shell);
-    encode_transform(encoder, set.grid->transform());
+    vshi_encode_array(encoder, set.matrix.data(), set.matrix.size(), sizeof set.matrix[0]);
     const float background = tree.background();
     vshi_encode_array(encoder, &background, 1, sizeof background);
     const std::vector<TileData> tiles = list_tiles(tree);
@@ -256,8 +147,8 @@ LevelSet decode_level_set(vshi_decoder *decoder, const char *path) {
     if (name == nullptr) {
         fail_answer(path, "a name");
     }
-    LevelSet set{{path, name}, nullptr, vshi_decode_number(decoder)};
-    const math::Transform::Ptr transform = decode_transform(decoder, path);
+    LevelSet set{{path, name}, nullptr, {}, vshi_decode_number(decoder)};
+    set.matrix = decode_matrix(decoder);
     const void *background = vshi_decode_array(decoder, 1, sizeof(float));
     const auto tree =
         std::make_shared<FloatTree>(background != nullptr ? *static_cast<const float *>(background) : 0.0f);
@@ -267,16 +158,15 @@ LevelSet decode_level_set(vshi_decoder *decoder, const char *path) {
         fail_answer(path, "the level set's size");
     }
     set.grid = FloatGrid::create(tree);
-    set.grid->setTransform(transform);
     return set;
 }
 
 // --- messages: voxels
 
-void encode_blocks(vshi_encoder *encoder, const std::string &grid, const math::Transform &transform,
+void encode_blocks(vshi_encoder *encoder, const std::string &grid, const Matrix &matrix,
                    const std::vector<vshi_block> &blocks) {
     vshi_encode_text(encoder, grid.c_str());
-    encode_transform(encoder, transform);
+    vshi_encode_array(encoder, matrix.data(), matrix.size(), sizeof matrix[0]);
     vshi_encode_count(encoder, blocks.size());
     for (const vshi_block &block : blocks) { // one by one: the struct's padding may hold anything
         vshi_encode_array(encoder, block.origin, 3, sizeof block.origin[0]);
@@ -285,11 +175,11 @@ void encode_blocks(vshi_encoder *encoder, const std::string &grid, const math::T
 }
 
 std::vector<vshi_block> decode_blocks(vshi_decoder *decoder, const char *path, std::string &grid,
-                                      math::Transform::Ptr &transform) {
+                                      Matrix &matrix) {
     constexpr size_t BLOCK_BYTES = 80;
     const char *name = vshi_decode_text(decoder, false);
     grid = name != nullptr ? name : "";
-    transform = decode_transform(decoder, path);
+    matrix = decode_matrix(decoder);
     const uint64_t count = vshi_decode_count(decoder, uint64_t(decoder->end - decoder->at) / BLOCK_BYTES);
     std::vector<vshi_block> blocks;
     blocks.reserve(count);
@@ -342,14 +232,12 @@ namespace {
 vsh_grid *read(const char *path, const char *name, const vsh_run &run) {
     Stage stage(run, "load");
     stage.check();
-    LevelSet set{{path, ""}, nullptr, 0.0};
+    LevelSet set{{path, ""}, nullptr, {}, 0.0};
     if (run.reader != nullptr) {
         Answer answer(stage);
         const auto encode = [&](vshi_encoder *to) { vshi_encode_text(to, name); };
         set = decode_level_set(answer.ask(VSHI_READ_GRID, path, encode), path);
-        set.grid->setGridClass(openvdb::GRID_LEVEL_SET); // the reader has checked the class
-        refuse_bad(set.name, examine_kind(*set.grid));
-        set.grid->clearGridClass(); // as load_level_set() does: meshing turns level sets over
+        refuse_bad(set.name, examine_matrix(set.matrix));
     } else {
         set = load_level_set(path, name, stage);
     }

@@ -106,7 +106,6 @@ class Conversion {
         std::vector<std::unique_ptr<Leaf>> made(leaves.size());
         stage.loop(leaves.size(), 64, at(0.9), end, [&](size_t i) { made[i] = make_leaf(i, background); });
         const FloatGrid::Ptr grid = FloatGrid::create(background);
-        grid->setTransform(lattice.transform());
         for (std::unique_ptr<Leaf> &leaf : made) {
             grid->tree().addLeaf(leaf.release());
         }
@@ -263,12 +262,7 @@ void check_redistance(const vsh_run &run, const Lattice &lattice, double area, c
 
 Surface mesh_surface(const FloatGrid &source, Stage &stage) {
     Surface surface;
-    stage.run([&] {
-        // In index space: world positions would lose a float's digits far from the origin.
-        const FloatGrid::ConstPtr unit =
-            source.copyReplacingTransform(openvdb::math::Transform::createLinearTransform());
-        openvdb::tools::volumeToMesh(*unit, surface.points, surface.polygons, 0.0);
-    });
+    stage.run([&] { openvdb::tools::volumeToMesh(source, surface.points, surface.polygons, 0.0); });
     stage.check();
     return surface;
 }

@@ -37,7 +37,7 @@ Placed place(const vsh_grid_instance &instance, size_t number) {
         refuse(VSH_ERROR_ARGUMENT, "unite: instance %zu has no grid", number);
     }
     const double *m = instance.transform != nullptr ? instance.transform : IDENTITY;
-    const Vec3d axis[3] = {{m[0], m[4], m[8]}, {m[1], m[5], m[9]}, {m[2], m[6], m[10]}};
+    const Vec3d axis[3] = {axis_of(m, 0), axis_of(m, 1), axis_of(m, 2)};
     const double scale = axis[0].length();
     bool even = scale > 0.0 && std::isfinite(scale) && Vec3d(m[3], m[7], m[11]).isFinite();
     for (int i = 0; i < 3; ++i) {
@@ -59,12 +59,6 @@ Placed place(const vsh_grid_instance &instance, size_t number) {
         }
     }
     return placed;
-}
-
-Vec3d apply(const double *m, const Vec3d &p) {
-    return Vec3d(m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3],
-                 m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
-                 m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
 }
 
 // Applies the inverse of a rotation times the voxel size: its transpose over the square.
@@ -220,7 +214,6 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
                            Stage &stage) {
     const float background = lattice.background();
     FloatGrid::Ptr united = FloatGrid::create(background);
-    united->setTransform(lattice.transform());
     const std::vector<Coord> origins = shifted_origins(parts, int32_t(Leaf::DIM), leaf_origins);
     std::vector<Leaf *> leaves;
     leaves.reserve(origins.size());
@@ -288,7 +281,7 @@ vsh_grid *unite(const vsh_grid_instance *instances, size_t count, const vsh_grid
         parts.push_back(part);
         shell = std::max(shell, placed[i].scale * placed[i].grid->info.shell_thickness);
     }
-    return close_grid(unite_parts(parts, lattice, 0.9, stage), shell, stage);
+    return close_grid(unite_parts(parts, lattice, 0.9, stage), lattice.matrix(), shell, stage);
 }
 
 } // namespace

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <limits>
 #include <memory>
-#include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/Prune.h>
 
 namespace vshi {
@@ -32,7 +31,7 @@ struct Channel {
 // Shared by the voxels and by the volumes made on them.
 struct VoxelSet {
     std::vector<vshi_block> blocks; // sorted by origin
-    openvdb::math::Transform::Ptr transform;
+    Matrix matrix{};
     double least_axis = 0.0; // shortest axis of a voxel, world units
 };
 
@@ -61,22 +60,6 @@ constexpr double FARTHEST = 1e12;      // voxels from the origin: doubles must t
 constexpr double ROUNDING = 1e-6;      // voxels by which a box may be longer without another voxel
 constexpr double BAND_ROUNDING = 1e-6; // share of a band's width: the background is a float
 
-Vec3d centre_of(const VoxelSet &set, const int32_t index[3]) {
-    return set.transform->indexToWorld(Vec3d(index[0], index[1], index[2]));
-}
-
-// Lengths of the axes of a voxel at `index`.
-Vec3d axes_at(const VoxelSet &set, const Vec3d &index) {
-    Vec3d lengths;
-    for (int axis = 0; axis < 3; ++axis) {
-        Vec3d half(0.0);
-        half[axis] = 0.5;
-        lengths[axis] =
-            (set.transform->indexToWorld(index + half) - set.transform->indexToWorld(index - half)).length();
-    }
-    return lengths;
-}
-
 void grow_index_box(vsh_voxels_info &info, const vshi_block &block) {
     for (int v = 0; v < VSHI_BLOCK_VOXELS; ++v) {
         const int offset[3] = {v >> 6, v >> 3 & 7, v & 7};
@@ -87,19 +70,25 @@ void grow_index_box(vsh_voxels_info &info, const vshi_block &block) {
     }
 }
 
-// Sets the box of the centres; false if it is not finite. A frustum's map keeps planes, so the corners' box
-// holds all centres.
+// Sets the box of the centres; false if it is not finite.
 bool set_bounds(const VoxelSet &set, vsh_voxels_info &info) {
-    const openvdb::CoordBBox indices{Coord(info.index_min), Coord(info.index_max)};
-    const openvdb::BBoxd box = set.transform->indexToWorld(indices);
-    const Vec3d axes = axes_at(set, indices.getCenter());
+    const double *m = set.matrix.data();
     bool finite = true;
+    std::fill_n(info.bounds_min, 3, std::numeric_limits<double>::max());
+    std::fill_n(info.bounds_max, 3, std::numeric_limits<double>::lowest());
     for (int axis = 0; axis < 3; ++axis) {
-        info.bounds_min[axis] = box.min()[axis];
-        info.bounds_max[axis] = box.max()[axis];
-        info.voxel_size[axis] = axes[axis];
-        finite =
-            finite && std::isfinite(box.min()[axis]) && std::isfinite(box.max()[axis]) && axes[axis] > 0.0;
+        info.voxel_size[axis] = axis_of(m, axis).length();
+        finite = finite && info.voxel_size[axis] > 0.0;
+    }
+    for (int corner = 0; corner < 8; ++corner) {
+        const Vec3d at = apply(m, Vec3d((corner & 1 ? info.index_max : info.index_min)[0],
+                                        (corner & 2 ? info.index_max : info.index_min)[1],
+                                        (corner & 4 ? info.index_max : info.index_min)[2]));
+        for (int axis = 0; axis < 3; ++axis) {
+            info.bounds_min[axis] = std::min(info.bounds_min[axis], at[axis]);
+            info.bounds_max[axis] = std::max(info.bounds_max[axis], at[axis]);
+            finite = finite && std::isfinite(at[axis]);
+        }
     }
     return finite;
 }
@@ -151,7 +140,7 @@ vsh_voxels *from_grid(const vsh_grid &grid, double band, const vsh_run &run) {
     check_blocks(run, double(tree.leafCount()), "voxels of a band");
     const float most = float((band > 0.0 ? band : widest) * grid.info.voxel_size);
     VoxelSet set;
-    set.transform = grid.level_set->transform().copy();
+    std::copy_n(grid.info.transform, 12, set.matrix.begin());
     for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
         vshi_block block{{leaf->origin()[0], leaf->origin()[1], leaf->origin()[2]}, {}};
         uint64_t any = 0;
@@ -212,8 +201,10 @@ vsh_voxels *from_box(const double low[3], const double high[3], double voxel, co
     // with the values of one grid, without which the voxels are of no use
     check_bytes(run, blocks * (double(sizeof(vshi_block)) + BYTES_PER_LEAF), what);
     VoxelSet set;
-    set.transform = openvdb::math::Transform::createLinearTransform(voxel);
-    set.transform->postTranslate(Vec3d(low[0], low[1], low[2]) + Vec3d(0.5 * voxel));
+    for (size_t axis = 0; axis < 3; ++axis) {
+        set.matrix[5 * axis] = voxel;
+        set.matrix[4 * axis + 3] = low[axis] + 0.5 * voxel;
+    }
     set.blocks.reserve(size_t(blocks));
     visit_blocks({Coord(0), Coord(size[0] - 1, size[1] - 1, size[2] - 1)}, 8,
                  [&](const Coord &origin) { set.blocks.push_back(box_block(origin, size)); });
@@ -269,6 +260,14 @@ std::vector<vshi_block> blocks_of(const openvdb::GridBase &grid, const char *wha
     return blocks;
 }
 
+Matrix linear_matrix_of(const openvdb::GridBase &grid, const GridName &name) {
+    if (!grid.transform().isLinear()) {
+        refuse(VSH_ERROR_INPUT, "%s: its transform is a %s: expected a linear one", name.text().c_str(),
+               grid.transform().mapType().c_str());
+    }
+    return matrix_of(grid.transform());
+}
+
 vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run) {
     Stage stage(run, "load");
     stage.check();
@@ -277,13 +276,12 @@ vsh_voxels *from_vdb(const char *path, const char *name, const vsh_run &run) {
     if (run.reader != nullptr) {
         Answer answer(stage);
         const auto encode = [&](vshi_encoder *to) { vshi_encode_text(to, name); };
-        set.blocks =
-            decode_blocks(answer.ask(VSHI_READ_VOXELS, path, encode), path, what.grid, set.transform);
+        set.blocks = decode_blocks(answer.ask(VSHI_READ_VOXELS, path, encode), path, what.grid, set.matrix);
         check_blocks(run, double(set.blocks.size()), what.text().c_str());
     } else {
         const openvdb::GridBase::Ptr grid = read_numbers(path, name, run);
         what.grid = grid->getName();
-        set.transform = grid->transform().copy();
+        set.matrix = linear_matrix_of(*grid, what);
         set.blocks = blocks_of(*grid, what.text().c_str(), run);
         stage.check();
     }
@@ -338,7 +336,7 @@ void grow_tree(Channel &channel, const VoxelSet &set) {
 
 FloatGrid::Ptr to_grid(const Channel &channel, const VoxelSet &set, bool as_half) {
     const FloatGrid::Ptr grid =
-        named_grid(channel.tree, *set.transform, channel.what.name, openvdb::GRID_UNKNOWN);
+        named_grid(channel.tree, set.matrix.data(), channel.what.name, openvdb::GRID_UNKNOWN);
     grid->setSaveFloatAsHalf(as_half);
     grid->insertMeta("description", openvdb::StringMetadata(channel.what.description));
     grid->insertMeta("vdbshade_method", openvdb::StringMetadata(channel.what.method));
@@ -397,7 +395,7 @@ vsh_result vshi_serve_voxels(const char *path, vshi_decoder *request, const vsh_
         vshi::end_request(request, path);
         const openvdb::GridBase::Ptr grid = vshi::read_numbers(path, name, *run);
         const vshi::GridName what{path, grid->getName()};
-        vshi::encode_blocks(payload, what.grid, grid->transform(),
+        vshi::encode_blocks(payload, what.grid, vshi::linear_matrix_of(*grid, what),
                             vshi::blocks_of(*grid, what.text().c_str(), *run));
     });
 }
@@ -411,7 +409,7 @@ void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
 }
 
 void vshi_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]) {
-    const vshi::Vec3d at = vshi::centre_of(*voxels->set, index);
+    const vshi::Vec3d at = vshi::apply(voxels->set->matrix.data(), vshi::Vec3d(index[0], index[1], index[2]));
     std::copy(at.asPointer(), at.asPointer() + 3, centre);
 }
 
@@ -430,8 +428,7 @@ size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]) {
 
 double vshi_voxels_longest_axis(const vsh_voxels *voxels) {
     const double *size = voxels->info.voxel_size;
-    return voxels->set->transform->isLinear() ? std::max({size[0], size[1], size[2]})
-                                              : std::numeric_limits<double>::infinity();
+    return std::max({size[0], size[1], size[2]});
 }
 
 void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
@@ -446,12 +443,12 @@ void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, c
 
 void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius) {
     const openvdb::Coord low(voxels->set->blocks[block].origin);
-    const openvdb::math::Transform &transform = *voxels->set->transform;
-    const vshi::Vec3d middle = transform.indexToWorld(low.asVec3d() + vshi::Vec3d(3.5));
+    const double *matrix = voxels->set->matrix.data();
+    const vshi::Vec3d middle = vshi::apply(matrix, low.asVec3d() + vshi::Vec3d(3.5));
     double square = 0.0;
     for (int corner = 0; corner < 8; ++corner) { // centres lie within their hull
         const vshi::Vec3d at((corner & 1) * 7.0, (corner >> 1 & 1) * 7.0, (corner >> 2) * 7.0);
-        square = std::max(square, (transform.indexToWorld(low.asVec3d() + at) - middle).lengthSqr());
+        square = std::max(square, (vshi::apply(matrix, low.asVec3d() + at) - middle).lengthSqr());
     }
     std::copy(middle.asPointer(), middle.asPointer() + 3, centre);
     *radius = std::sqrt(square);
@@ -531,28 +528,6 @@ void vsh_volume_get_info(const vsh_volume *volume, vsh_volume_info *info) {
 void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid *info) {
     const vsh_volume_grid none{};
     *info = grid < volume->channels.size() ? volume->channels[grid].info : none;
-}
-
-vsh_result vshi_volume_sample(const vsh_volume *volume, size_t grid, size_t count, const double *positions,
-                              float *values, vsh_error *error) {
-    VSHI_NEEDS(volume);
-    VSHI_NEEDS_OF(count, positions);
-    VSHI_NEEDS_OF(count, values);
-    return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
-        const vshi::FloatTree &tree = *vshi::channel_of(*volume, grid).tree;
-        const openvdb::tree::ValueAccessor<const vshi::FloatTree> at(tree);
-        constexpr double FARTHEST = 2147483646.0;
-        for (size_t i = 0; i < count; ++i) {
-            const double *p = positions + 3 * i;
-            const vshi::Vec3d index = volume->set->transform->worldToIndex(vshi::Vec3d(p[0], p[1], p[2]));
-            bool inside = true; // the range of indices; false for NaN
-            for (int axis = 0; axis < 3; ++axis) {
-                inside = inside && std::fabs(index[axis]) < FARTHEST;
-            }
-            values[i] = inside ? openvdb::tools::BoxSampler::sample(at, index)
-                               : std::numeric_limits<float>::quiet_NaN();
-        }
-    });
 }
 
 vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t index_min[3],

@@ -3,10 +3,12 @@
 #include "base/text.h"
 #include "levelset/file.h"
 
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <openvdb/io/Archive.h>
 #include <ostream>
+#include <sstream>
 #include <streambuf>
 #include <vector>
 
@@ -160,10 +162,41 @@ vsh_result write_grids(const char *path, double voxel_size, const vsh_attribute 
     });
 }
 
-FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Transform &transform,
-                          const std::string &name, openvdb::GridClass grid_class) {
+namespace {
+
+// Reads a map as OpenVDB writes it: its constructors compute scales from differences of positions, which
+// loses bits far from the origin.
+openvdb::math::Transform::Ptr make_transform(const double *m) {
+    namespace math = openvdb::math;
+    std::stringstream text;
+    openvdb::io::setCurrentVersion(text);
+    if (m[1] == 0.0 && m[2] == 0.0 && m[4] == 0.0 && m[6] == 0.0 && m[8] == 0.0 && m[9] == 0.0) {
+        const Vec3d scale(m[0], m[5], m[10]), inverse = 1.0 / scale;
+        const Vec3d size(std::fabs(scale[0]), std::fabs(scale[1]), std::fabs(scale[2]));
+        openvdb::writeString(text, m[0] == m[5] && m[0] == m[10] ? math::UniformScaleTranslateMap::mapType()
+                                                                 : math::ScaleTranslateMap::mapType());
+        for (const Vec3d &member :
+             {axis_of(m, 3), scale, size, inverse, Vec3d(inverse * inverse), Vec3d(inverse / 2.0)}) {
+            member.write(text);
+        }
+    } else {
+        openvdb::writeString(text, math::AffineMap::mapType());
+        math::Mat4d(m[0], m[4], m[8], 0.0, m[1], m[5], m[9], 0.0, m[2], m[6], m[10], 0.0, m[3], m[7], m[11],
+                    1.0)
+            .write(text);
+    }
+    const auto transform = std::make_shared<math::Transform>();
+    transform->read(text);
+    return transform;
+}
+
+} // namespace
+
+FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const double *matrix, const std::string &name,
+                          openvdb::GridClass grid_class) {
+    initialize();
     const FloatGrid::Ptr grid = FloatGrid::create(tree);
-    grid->setTransform(transform.copy());
+    grid->setTransform(make_transform(matrix));
     grid->setName(name);
     grid->setGridClass(grid_class);
     grid->setCreator(std::string("vdbshade ") + vsh_version());
@@ -172,7 +205,7 @@ FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const openvdb::math::Trans
 
 FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name) {
     const FloatGrid::Ptr named =
-        named_grid(grid.level_set->treePtr(), grid.level_set->transform(), name, openvdb::GRID_LEVEL_SET);
+        named_grid(grid.level_set->treePtr(), grid.info.transform, name, openvdb::GRID_LEVEL_SET);
     if (grid.info.shell_thickness > 0.0) {
         named->insertMeta(SHELL_THICKNESS, openvdb::DoubleMetadata(grid.info.shell_thickness));
     }

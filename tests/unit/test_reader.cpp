@@ -446,8 +446,8 @@ TEST(damaged_level_sets_are_refused_or_are_trees) {
             const vshi::LevelSet set = vshi::decode_level_set(decoder, "a.vdb");
             const vsh_run run = vsh_run_default();
             vshi::Stage stage(run, "load");
-            if (vshi::examine_kind(*set.grid).kind != vshi::Finding::BAD) {
-                vshi::examine_values(*set.grid, stage);
+            if (vshi::examine_matrix(set.matrix).kind != vshi::Finding::BAD) {
+                vshi::examine_values(*set.grid, vshi::axis_of(set.matrix.data(), 0).length(), stage);
             }
         });
     });
@@ -459,8 +459,8 @@ TEST(damaged_voxels_are_refused_or_sorted) {
     const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
         return refuses([&] {
             std::string grid;
-            openvdb::math::Transform::Ptr transform;
-            const auto blocks = vshi::decode_blocks(decoder, "a.vdb", grid, transform);
+            vshi::Matrix matrix;
+            const auto blocks = vshi::decode_blocks(decoder, "a.vdb", grid, matrix);
             assert_true(std::is_sorted(blocks.begin(), blocks.end(), [](const auto &a, const auto &b) {
                 return std::lexicographical_compare(a.origin, a.origin + 3, b.origin, b.origin + 3);
             }));

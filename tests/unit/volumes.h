@@ -67,6 +67,31 @@ static inline dense copy_of(const vsh_volume *volume, size_t grid, const vsh_vox
     return d;
 }
 
+/* The value at a point, interpolated between the eight voxels around it; beyond the box it is 1, lit. The
+ * voxels are cubes along the world's axes. */
+static inline float sample_dense(const dense *d, const double p[3]) {
+    const double voxel = d->centre[3] - d->centre[0];
+    float value[8];
+    for (int corner = 0; corner < 8; ++corner) {
+        size_t at = 0, stride = 1;
+        bool inside = true;
+        for (int axis = 0; axis < 3; ++axis) {
+            const double place = floor((p[axis] - d->centre[axis]) / voxel) + (corner >> axis & 1);
+            inside = inside && place >= 0.0 && place < d->size[axis];
+            at += inside ? (size_t)place * stride : 0;
+            stride *= (size_t)d->size[axis];
+        }
+        value[corner] = inside ? d->values[at] : 1.0f;
+    }
+    for (int axis = 0, count = 4; axis < 3; ++axis, count /= 2) {
+        const double index = (p[axis] - d->centre[axis]) / voxel;
+        for (int i = 0; i < count; ++i) {
+            value[i] = value[2 * i] + (float)(index - floor(index)) * (value[2 * i + 1] - value[2 * i]);
+        }
+    }
+    return value[0];
+}
+
 static inline void free_dense(dense *d) {
     free(d->values);
     free(d->centre);
