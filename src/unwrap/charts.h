@@ -83,8 +83,8 @@ vshi_heap_entry vshi_heap_pop(vshi_heap *heap);
 
 /* --- patches: charts as meshes of their own (patch.c) */
 
-/* Angles of a patch in the atlas, 11.25° apart, and the quarter turns of each. */
-enum { VSHI_ANGLES = 8, VSHI_QUARTERS = 4 };
+/* Angles of a patch in the atlas, 22.5° apart, and the quarter turns of each. */
+enum { VSHI_ANGLES = 4, VSHI_QUARTERS = 4 };
 
 typedef struct vshi_patch {
     const vshi_cut_mesh *surface;

@@ -1,7 +1,6 @@
 /* Charts by variational shape approximation (Cohen-Steiner, Alliez and Desbrun, 2004). The costs of growth
- * make charts round and their borders straight, as in Young's and Castaño's chart growers. A first partition
- * grows one chart after the other, from the largest unit that is left, as far as normals allow. Then all
- * charts grow again at once, from the unit in the middle of each, which evens them out. */
+ * make charts round and their borders straight, as in Young's and Castaño's chart growers. One chart after
+ * the other grows from the largest unit that is left, as far as normals allow. */
 #include "unwrap/charts.h"
 
 #include "base/memory.h"
@@ -62,8 +61,6 @@ static const double NORMAL = 2.0, STRAIGHT = 1.0, SEAM = 2.0, FAR = 0.5;
 
 enum {
     NORMAL_SMOOTHINGS = 2,
-    ROUNDS = 3, /* of growing all charts again */
-    BORDER_SMOOTHINGS = 8,
     MOST_SIDES = 48, /* a unit's first sides that count for straightness */
     CHUNK = 4096     /* units between checks for cancellation */
 };
@@ -79,9 +76,6 @@ typedef struct chart {
     vshi_vec axis;   /* unit */
     vshi_vec sum;    /* of normals, by area */
     vshi_vec middle; /* where growth began */
-    vshi_vec centre; /* by area, of its units */
-    double area;
-    uint32_t seed;
 } chart;
 
 typedef struct growing {
@@ -96,7 +90,7 @@ typedef struct growing {
     chart *charts;   /* [count]: as many as there may be */
     uint32_t chart_count;
     vshi_heap heap;
-    double radius;  /* a chart of mean area has this radius */
+    double radius;  /* of a chart, for distances from its middle */
     uint32_t added; /* units */
 } growing;
 
@@ -217,28 +211,23 @@ static vsh_result push_around(growing *w, uint32_t number, uint32_t by, vsh_erro
 
 static void add_to_chart(growing *w, uint32_t number, uint32_t by) {
     const unit *u = &w->units[number];
-    chart *c = &w->charts[by];
     w->owner[number] = by;
-    c->sum = vshi_add(c->sum, vshi_scale(u->normal, u->area));
-    c->centre = vshi_add(c->centre, vshi_scale(u->centre, u->area));
-    c->area += u->area;
+    w->charts[by].sum = vshi_add(w->charts[by].sum, vshi_scale(u->normal, u->area));
 }
 
-/* Grows charts by the units in the heap until none fits. With `follow`, axes follow the units of a chart. */
-static vsh_result grow(growing *w, bool follow, vsh_error *error) {
+/* Grows the chart by the units in the heap until none fits. Its axis follows its units. */
+static vsh_result grow(growing *w, vsh_error *error) {
     while (w->heap.count > 0) {
         const vshi_heap_entry next = vshi_heap_pop(&w->heap);
         if (w->owner[next.what] != VSHI_NONE) {
             continue;
         }
         chart *c = &w->charts[next.by];
-        if (follow && vshi_dot(w->units[next.what].normal, c->axis) <= WIDEST) {
+        if (vshi_dot(w->units[next.what].normal, c->axis) <= WIDEST) {
             continue;
         }
         add_to_chart(w, next.what, next.by);
-        if (follow) {
-            c->axis = vshi_unit(c->sum);
-        }
+        c->axis = vshi_unit(c->sum);
         VSHI_TRY(push_around(w, next.what, next.by, error));
         if (++w->added % CHUNK == 0 && vshi_job_advance(w->job, 0)) {
             return vshi_job_fail_cancelled(w->job, error);
@@ -247,90 +236,19 @@ static vsh_result grow(growing *w, bool follow, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Makes charts of units without one, one after the other, from the largest unit on. */
-static vsh_result grow_rest(growing *w, vsh_error *error) {
+/* Grows all charts, from the largest unit on. */
+static vsh_result grow_all(growing *w, vsh_error *error) {
     for (uint32_t i = 0; i < w->count; ++i) {
         const uint32_t seed = w->by_area[i].number, by = w->chart_count;
         if (w->owner[seed] == VSHI_NONE) {
             w->charts[w->chart_count++] =
-                (chart){.axis = w->units[seed].normal, .middle = w->units[seed].centre, .seed = seed};
+                (chart){.axis = w->units[seed].normal, .middle = w->units[seed].centre};
             add_to_chart(w, seed, by);
             VSHI_TRY(push_around(w, seed, by, error));
-            VSHI_TRY(grow(w, true, error));
+            VSHI_TRY(grow(w, error));
         }
     }
     return VSH_OK;
-}
-
-/* The next seeds: a unit near each chart's middle whose normal is near the chart's. */
-static void find_seeds(growing *w) {
-    double total = 0.0;
-    for (uint32_t c = 0; c < w->chart_count; ++c) {
-        chart *one = &w->charts[c];
-        one->axis = vshi_unit(one->sum);
-        one->middle = vshi_scale(one->centre, 1.0 / one->area);
-        one->seed = VSHI_NONE;
-        total += one->area;
-    }
-    w->radius = sqrt(total / w->chart_count / 3.0);
-    for (uint32_t u = 0; u < w->count; ++u) {
-        chart *one = &w->charts[w->owner[u]];
-        const unit *own = &w->units[u];
-        const double far = 1.0 - vshi_dot(own->normal, one->axis) +
-                           0.3 * vshi_length(vshi_sub(own->centre, one->middle)) / w->radius;
-        if (one->seed == VSHI_NONE || far < one->sum.x) {
-            one->seed = u;
-            one->sum.x = far; /* reused for the least so far */
-        }
-    }
-}
-
-static vsh_result grow_again(growing *w, vsh_error *error) {
-    find_seeds(w);
-    memset(w->owner, 0xff, w->count * sizeof *w->owner);
-    for (uint32_t c = 0; c < w->chart_count; ++c) {
-        chart *one = &w->charts[c];
-        one->sum = one->centre = (vshi_vec){0, 0, 0};
-        one->area = 0.0;
-        add_to_chart(w, one->seed, c);
-    }
-    for (uint32_t c = 0; c < w->chart_count; ++c) {
-        VSHI_TRY(push_around(w, w->charts[c].seed, c, error));
-    }
-    VSHI_TRY(grow(w, false, error));
-    return grow_rest(w, error);
-}
-
-/* Moves the teeth of borders to the chart around them. A tooth is a unit connected to its own chart by one
- * unit, that shares more of its border with another chart; its own chart stays connected. */
-static uint32_t move_teeth(growing *w) {
-    uint32_t moved = 0;
-    for (uint32_t u = 0; u < w->count; ++u) {
-        const uint32_t own = w->owner[u], begin = w->begin[u], end = w->begin[u + 1];
-        uint32_t mate = VSHI_NONE, other = VSHI_NONE;
-        bool loose = end - begin <= MOST_SIDES;
-        double inside = 0.0, outside = 0.0;
-        for (uint32_t i = begin; i < end && loose; ++i) {
-            const uint32_t beyond = unit_beyond(w, i);
-            const double length = vshi_side_length(w->surface, w->sides[i]);
-            if (w->owner[beyond] == own) {
-                loose = mate == VSHI_NONE || mate == beyond;
-                mate = beyond;
-                inside += length;
-            } else if (other == VSHI_NONE || w->owner[beyond] == other) {
-                other = w->owner[beyond];
-                outside += w->surface->soft[w->sides[i]] ? length : 0.0;
-            } else {
-                loose = false; /* three charts meet here */
-            }
-        }
-        if (loose && mate != VSHI_NONE && other != VSHI_NONE && outside > inside &&
-            vshi_dot(w->units[u].normal, w->charts[other].axis) > WIDEST) {
-            w->owner[u] = other;
-            ++moved;
-        }
-    }
-    return moved;
 }
 
 vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *chart_of,
@@ -350,12 +268,7 @@ vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_
     for (uint32_t u = 0; u < w.count; ++u) {
         w.owner[u] = VSHI_NONE;
     }
-    VSHI_TRY_DONE(grow_rest(&w, error));
-    for (int round = 0; round < ROUNDS && w.chart_count < w.count; ++round) {
-        VSHI_TRY_DONE(grow_again(&w, error));
-    }
-    for (int round = 0; round < BORDER_SMOOTHINGS && move_teeth(&w) > 0; ++round) {
-    }
+    VSHI_TRY_DONE(grow_all(&w, error));
     for (size_t i = 0; i < surface->count; ++i) {
         chart_of[i] = surface->unit[i] != VSHI_NONE ? w.owner[surface->unit[i]] : VSHI_NONE;
     }

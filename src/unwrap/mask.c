@@ -215,13 +215,9 @@ void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double
 
 /* Cosines and sines of the angles. */
 static const double TURNS[VSHI_ANGLES][2] = {{1.0, 0.0},
-                                             {0.98078528040323043, 0.19509032201612828},
                                              {0.92387953251128676, 0.38268343236508977},
-                                             {0.83146961230254524, 0.55557023301960218},
                                              {0.70710678118654752, 0.70710678118654752},
-                                             {0.55557023301960218, 0.83146961230254524},
-                                             {0.38268343236508977, 0.92387953251128676},
-                                             {0.19509032201612828, 0.98078528040323043}};
+                                             {0.38268343236508977, 0.92387953251128676}};
 
 /* --- the smallest box around a chart: one of its sides runs along the convex hull (Freeman and Shapira,
  * "Determining the minimum-area encasing rectangle for an arbitrary closed curve", 1975) */

@@ -2,7 +2,6 @@
  * areas and borders, then steps up or down until one fits and the next does not, then densities between. */
 #include "unwrap/charts.h"
 
-#include "base/bytes.h"
 #include "base/memory.h"
 #include "base/parallel.h"
 
@@ -25,29 +24,23 @@ typedef struct atlas_page {
     uint64_t *forbidden, *grown; /* [words + 1]: scratch of the search */
 } atlas_page;
 
-/* Which chart comes first. */
-enum { BY_SIDES = 0, BY_AREA = 1, BY_LONGEST = 2, ORDERS = 3 };
-
 typedef struct placing {
     const vshi_packing *packing;
     vshi_job *job;
     vshi_pack_item *items; /* [count] */
     size_t count;
     double density;
-    int angle_step;       /* 1 or 2: every angle is tried, or every second */
-    int32_t least_turned; /* texels: shorter charts are turned by quarters only */
-    vshi_mask **masks;    /* [count][angles × VSHI_QUARTERS]; runs are NULL for turns not yet made; one
-                             block with all arrays, those of the page too */
-    int *angles;          /* [count]: how many are tried of each */
+    vshi_mask **masks; /* [count][angles × VSHI_QUARTERS]; runs are NULL for turns not yet made; one
+                          block with all arrays, those of the page too */
+    int *angles;       /* [count]: how many are tried of each */
     vshi_fit (*fits)[VSHI_ANGLES]; /* [count] */
     uint32_t *order;               /* [count]: items in the order in which they are placed */
     atlas_page page;
     int32_t *hints; /* row where the last chart of a size was placed */
 } placing;
 
-enum { LEAST_TURNED = 40 };               /* texels, for `least_turned` */
+enum { LEAST_TURNED = 40 };               /* texels: shorter charts are turned by quarters only */
 enum { IMPATIENT = 3000, PATIENCE = 24 }; /* charts; rows */
-enum { THOROUGH = 64 };                   /* most charts for which every angle is tried */
 enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and search from the first row on */
 
 /* Share of a page's texels that padded charts may have for it to be tried. */
@@ -282,9 +275,7 @@ static void mark_taken(atlas_page *page, const vshi_mask *mask, int32_t x, int32
  * Errors: VSH_ERROR_MEMORY. */
 static vsh_result placing_begin(const vshi_packing *packing, int32_t height, vshi_pack_item *items,
                                 size_t count, vshi_job *job, placing *p, vsh_error *error) {
-    *p = (placing){
-        .packing = packing, .job = job, .items = items, .count = count, .least_turned = LEAST_TURNED};
-    p->angle_step = count > THOROUGH ? 2 : 1;
+    *p = (placing){.packing = packing, .job = job, .items = items, .count = count};
     atlas_page *page = &p->page;
     *page = (atlas_page){.width = packing->width,
                          .height = height,
@@ -325,14 +316,13 @@ static void placing_free(placing *p) {
 static vsh_result make_masks(void *user, size_t i, vsh_error *error) {
     placing *p = user;
     const vshi_pack_item *item = &p->items[i];
-    const bool plain = vshi_patch_is_box(item->patch) || p->fits[i][0].width < p->least_turned;
-    p->angles[i] = plain ? 1 : VSHI_ANGLES / p->angle_step;
+    const bool plain = vshi_patch_is_box(item->patch) || p->fits[i][0].width < LEAST_TURNED;
+    p->angles[i] = plain ? 1 : VSHI_ANGLES;
     VSHI_TRY(vshi_allocate((void **)&p->masks[i], (size_t)p->angles[i], VSHI_QUARTERS * sizeof(vshi_mask),
                            what, error));
-    for (int n = 0; n < p->angles[i]; ++n) {
-        const int a = n * p->angle_step;
+    for (int a = 0; a < p->angles[i]; ++a) {
         p->fits[i][a] = vshi_mask_fit(item->patch, a, p->density * item->factor, p->packing->max_stretch);
-        VSHI_TRY(vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][VSHI_QUARTERS * n], error));
+        VSHI_TRY(vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][VSHI_QUARTERS * a], error));
     }
     return VSH_OK;
 }
@@ -354,16 +344,12 @@ static int compare_sort_keys(const void *a, const void *b) {
     return (x->item > y->item) - (x->item < y->item);
 }
 
-static vsh_result sort_items(placing *p, int by, vsh_error *error) {
+static vsh_result sort_items(placing *p, vsh_error *error) {
     sort_key *keys = NULL;
     VSHI_TRY(vshi_allocate((void **)&keys, p->count, sizeof *keys, what, error));
     for (size_t i = 0; i < p->count; ++i) {
         const vshi_fit *fit = &p->fits[i][0];
-        const double width = fit->width, height = fit->height, padding = p->packing->padding;
-        const double key = by == BY_SIDES  ? width + height
-                           : by == BY_AREA ? (width + padding) * (height + padding)
-                                           : (width > height ? width : height);
-        keys[i] = (sort_key){key, p->masks[i][0].touched, (uint32_t)i};
+        keys[i] = (sort_key){(double)fit->width + fit->height, p->masks[i][0].touched, (uint32_t)i};
     }
     qsort(keys, p->count, sizeof *keys, compare_sort_keys);
     for (size_t i = 0; i < p->count; ++i) {
@@ -431,7 +417,7 @@ static vsh_result place_item(placing *p, uint32_t index, bool *placed, vsh_error
             best_end = end;
             at->x = x;
             at->y = y;
-            at->angle = n * p->angle_step;
+            at->angle = n;
             at->quarters = t;
             *placed = true;
         }
@@ -596,22 +582,7 @@ static const double SHRINK = 0.97;   /* of the density if the excess is unknown 
 static const double CLIMB = 1.008, LEAST_CLIMB = 1.001; /* from one that fits to the next attempt */
 static const double OVER = 100.0;                       /* an unknown excess */
 
-enum {
-    SMALLER = 4,
-    REHEARSED = -1,
-    PER_REHEARSAL = 300 /* triangles */,
-    LEAST_REHEARSALS = 12,
-    MOST_REHEARSALS = 200
-};
-
-enum {
-    MOST_STEPS = 400,
-    FEW = 300,
-    MANY = 500,
-    LEGION = 20000 /* charts */,
-    SMALL = 10000 /* triangles */,
-    ATTEMPTS = 16
-};
+enum { MOST_STEPS = 400, MANY = 500 /* charts */, ATTEMPTS = 16 };
 
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
     const double page =
@@ -625,12 +596,10 @@ typedef struct search {
     vshi_pack_item *items;
     size_t count;
     placing placing;
-    vshi_place *best;    /* [count]; one block with `order` */
+    vshi_place *best;    /* [count] */
     double best_density; /* 0: none yet */
     uint32_t best_pages;
     vshi_job *job;
-    uint32_t *order; /* [count]: of rehearsals */
-    bool has_order;
     size_t units, reported; /* of the job's progress: all, and so far */
 } search;
 
@@ -650,80 +619,6 @@ static void restore_best(search *s) {
     s->packing->pages = s->best_pages;
 }
 
-/* --- an order found by rehearsals on a small page */
-
-/* Rows that the order takes, plus a fraction for how low its charts begin: the less, the better. */
-static vsh_result rehearse(placing *p, double *result_rows, vsh_error *error) {
-    uint32_t pages = 0;
-    int32_t rows = 0;
-    double ends = 0.0;
-    VSHI_TRY(place_all(p, &pages, &rows, error));
-    for (size_t i = 0; i < p->count; ++i) {
-        ends += p->items[i].at.y;
-    }
-    *result_rows = rows + ends / ((double)p->count * p->page.height + 1.0);
-    return VSH_OK;
-}
-
-static uint64_t next_random(uint64_t *state) {
-    *state += UINT64_C(0x9e3779b97f4a7c15);
-    return vshi_mix(*state);
-}
-
-/* Moves a chart to another place in the order, mostly a near one. */
-static void move_one(uint32_t *order, size_t count, uint64_t *state) {
-    const size_t from = (size_t)(next_random(state) % count),
-                 reach = 1 + (size_t)(next_random(state) % count);
-    const size_t far = 1 + (size_t)(next_random(state) % reach);
-    const size_t to = (next_random(state) & 1) != 0 ? (from + far < count ? from + far : count - 1)
-                                                    : (from > far ? from - far : 0);
-    const uint32_t moved = order[from];
-    if (to > from) {
-        memmove(order + from, order + from + 1, (to - from) * sizeof *order);
-    } else {
-        memmove(order + to + 1, order + to, (from - to) * sizeof *order);
-    }
-    order[to] = moved;
-}
-
-/* Fills s->order with the best order of some hundred attempts on a page of a quarter of the size. */
-static vsh_result find_order(search *s, double density, int tries, vsh_error *error) {
-    vshi_packing small = *s->packing;
-    small.width = (small.width + SMALLER - 1) / SMALLER;
-    small.height = (small.height + SMALLER - 1) / SMALLER;
-    small.padding = (small.padding + SMALLER - 1) / SMALLER;
-    placing p;
-    const size_t bytes = s->count * sizeof *s->order;
-    uint64_t state = s->count;
-    double best = INFINITY, rows = 0.0;
-    vsh_result result;
-    VSHI_TRY_DONE(placing_begin(&small, 2 * small.height, s->items, s->count, s->job, &p, error));
-    p.least_turned = (p.least_turned + SMALLER - 1) / SMALLER;
-    VSHI_TRY_DONE(set_density(&p, density / SMALLER, &s->has_order, error));
-    for (int by = 0; by < ORDERS && s->has_order; ++by) {
-        VSHI_TRY_DONE(sort_items(&p, by, error));
-        VSHI_TRY_DONE(rehearse(&p, &rows, error));
-        if (rows < best) {
-            best = rows;
-            memcpy(s->order, p.order, bytes);
-        }
-    }
-    for (int i = 0; i < tries && s->has_order; ++i) {
-        memcpy(p.order, s->order, bytes);
-        for (uint64_t moves = 1 + next_random(&state) % 3; moves > 0; --moves) {
-            move_one(p.order, s->count, &state);
-        }
-        VSHI_TRY_DONE(rehearse(&p, &rows, error));
-        if (rows <= best) {
-            best = rows;
-            memcpy(s->order, p.order, bytes);
-        }
-    }
-done:
-    placing_free(&p);
-    return result;
-}
-
 /* The number of attempts is unknown: each advances by a share of a guess, and the last share is left for the
  * end. */
 static void report_attempt(search *s) {
@@ -734,29 +629,25 @@ static void report_attempt(search *s) {
     }
 }
 
-/* Attempts a density in the first `orders` orders, until one fits. *over is the least room needed over the
- * room there is; above 1 none fits. */
-static vsh_result attempt(search *s, double density, int orders, double *over, vsh_error *error) {
+/* Attempts a density. *over is the room needed over the room there is; above 1 the charts do not fit. */
+static vsh_result attempt(search *s, double density, double *over, vsh_error *error) {
     placing *p = &s->placing;
     bool possible = false;
+    uint32_t pages = 0;
+    int32_t rows = 0;
     *over = INFINITY;
     VSHI_TRY(set_density(p, density, &possible, error));
-    for (int order = s->has_order ? REHEARSED : 0; order < orders && possible && *over > 1.0; ++order) {
-        uint32_t pages = 0;
-        int32_t rows = 0;
-        if (order == REHEARSED) {
-            memcpy(p->order, s->order, s->count * sizeof *s->order);
-        } else {
-            VSHI_TRY(sort_items(p, order, error));
-        }
-        VSHI_TRY(place_all(p, &pages, &rows, error));
-        *over = fmin(*over, s->packing->max_pages == 1       ? (double)rows / s->packing->height
-                            : pages <= s->packing->max_pages ? 1.0
-                                                             : OVER);
-        report_attempt(s);
-        if (*over <= 1.0 && density > s->best_density) {
-            keep_places(s, density, pages);
-        }
+    if (!possible) {
+        return VSH_OK;
+    }
+    VSHI_TRY(sort_items(p, error));
+    VSHI_TRY(place_all(p, &pages, &rows, error));
+    *over = s->packing->max_pages == 1       ? (double)rows / s->packing->height
+            : pages <= s->packing->max_pages ? 1.0
+                                             : OVER;
+    report_attempt(s);
+    if (*over <= 1.0 && density > s->best_density) {
+        keep_places(s, density, pages);
     }
     return VSH_OK;
 }
@@ -799,33 +690,11 @@ static double guess_density(const search *s) {
     return low > 0.0 ? low : high;
 }
 
-static size_t count_triangles(const search *s) {
-    size_t triangles = 0;
-    for (size_t i = 0; i < s->count; ++i) {
-        triangles += s->items[i].patch->count;
-    }
-    return triangles;
-}
-
-/* Rehearsals grow with the time spent on making the charts. */
-static int count_rehearsals(const search *s) {
-    const size_t tries = count_triangles(s) / PER_REHEARSAL;
-    return s->packing->max_pages > 1 || s->count < 2 || s->count > FEW ? 0
-           : tries < LEAST_REHEARSALS                                  ? LEAST_REHEARSALS
-           : tries > MOST_REHEARSALS                                   ? MOST_REHEARSALS
-                                                                       : (int)tries;
-}
-
 /* The greatest density that fits among some attempts. */
-static vsh_result find_density(search *s, int orders, int climbs, vsh_error *error) {
+static vsh_result find_density(search *s, int climbs, vsh_error *error) {
     double density = guess_density(s), over = INFINITY, shrink = SHRINK;
-    const int tries = count_rehearsals(s);
-    if (tries > 0) {
-        VSHI_TRY(find_order(s, density, tries, error));
-        orders = 1;
-    }
     for (int i = 0; i < MOST_STEPS && s->best_density == 0.0; ++i) {
-        VSHI_TRY(attempt(s, density, orders, &over, error));
+        VSHI_TRY(attempt(s, density, &over, error));
         if (s->best_density > 0.0) {
             break;
         }
@@ -852,7 +721,7 @@ static vsh_result find_density(search *s, int orders, int climbs, vsh_error *err
         if (density < s->best_density * LEAST_CLIMB) {
             break;
         }
-        VSHI_TRY(attempt(s, density, orders, &over, error));
+        VSHI_TRY(attempt(s, density, &over, error));
         failed = over > 1.0 ? density : failed;
     }
     return VSH_OK;
@@ -867,7 +736,7 @@ vsh_result vshi_pack_one(vshi_packing *packing, vshi_pack_item *items, size_t co
     VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, what, error));
     keep_places(&s, 0.0, 1);
     VSHI_TRY_DONE(placing_begin(packing, packing->height, items, count, job, &s.placing, error));
-    VSHI_TRY_DONE(attempt(&s, packing->density, ORDERS, &over, error));
+    VSHI_TRY_DONE(attempt(&s, packing->density, &over, error));
     *fits = over <= 1.0;
     s.best_density = packing->density;
     restore_best(&s);
@@ -882,20 +751,14 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_pack_item *items, size_t count,
     search s = {.packing = packing, .items = items, .count = count, .job = job, .units = units};
     const double asked = packing->density;
     const int32_t height = packing->max_pages == 1 ? packing->height + packing->height / 4 : packing->height;
-    const int orders = count < MANY ? ORDERS : 1;
-    const int climbs = count < FEW && count_triangles(&s) > SMALL ? 8
-                       : count < MANY                             ? 4
-                       : count < LEGION                           ? 2
-                                                                  : 1;
     vsh_result result;
-    const vshi_array arrays[] = {VSHI_ARRAY(s.best, count), VSHI_ARRAY(s.order, count)};
-    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&s.best, count, sizeof *s.best, what, error));
     VSHI_TRY_DONE(placing_begin(packing, height, items, count, job, &s.placing, error));
     if (asked > 0.0) {
         double over = INFINITY;
-        VSHI_TRY_DONE(attempt(&s, asked, ORDERS, &over, error));
+        VSHI_TRY_DONE(attempt(&s, asked, &over, error));
         if (over > 1.0) {
-            VSHI_TRY_DONE(find_density(&s, 1, 1, error));
+            VSHI_TRY_DONE(find_density(&s, 1, error));
             result = vshi_fail(
                 error, VSH_ERROR_LIMIT,
                 "charts do not fit into %u page%s of %d × %d texels at %g texels a unit: %.4g would fit",
@@ -904,7 +767,7 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_pack_item *items, size_t count,
             goto done;
         }
     } else {
-        VSHI_TRY_DONE(find_density(&s, orders, climbs, error));
+        VSHI_TRY_DONE(find_density(&s, count < MANY ? 4 : 2, error));
     }
     restore_best(&s);
     if (vshi_job_advance(job, units - s.reported)) {

@@ -15,9 +15,6 @@ static const char what[] = "charts of meshes";
  * of 32-bit quaternions differ by 1e-7 or so. */
 static const double ALIKE = 1e-5;
 
-/* Most share of all charts' area for a joined chart: larger ones leave gaps that nothing fills. */
-static const double LARGEST = 0.35;
-
 enum {
     MOST_SHAPES = 64, /* of one set of arrays that a mesh is compared with */
     MOST_ROUNDS = 24, /* of joining charts */
@@ -159,7 +156,7 @@ typedef struct trial {
 typedef struct merging {
     const vshi_cut_mesh *surface;
     vshi_patches *patches;
-    double max_stretch, max_area;
+    double max_stretch;
     uint32_t *owner;   /* [triangles]: chart; VSHI_NONE: without area; one block with the four arrays below */
     double *perimeter; /* [charts] */
     uint32_t *version; /* [charts]: a number that no other chart had before */
@@ -180,15 +177,11 @@ static const double HARD = 0.3;          /* weight of a hard seam's length in th
  * 4 to 1. Charts beyond ROUND are joined only if that makes them no worse. */
 static const double ROUND = 28.0, NO_WORSE = 1.1;
 
-/* Begins with the charts of a surface, which must outlive the merging. No joined chart has more than
- * max_area, surface units². */
-static vsh_result merging_begin(const vshi_cut_mesh *s, vshi_patches *patches, double max_stretch,
-                                double max_area, merging *m, vsh_error *error) {
+/* Begins with the charts of a surface, which must outlive the merging. */
+static vsh_result merging_begin(const vshi_cut_mesh *s, vshi_patches *patches, double max_stretch, merging *m,
+                                vsh_error *error) {
     const size_t count = patches->count;
-    *m = (merging){.surface = s,
-                   .patches = patches,
-                   .max_area = max_area,
-                   .max_stretch = fmin(max_stretch, MOST_STRETCH)};
+    *m = (merging){.surface = s, .patches = patches, .max_stretch = fmin(max_stretch, MOST_STRETCH)};
     const vshi_array arrays[] = {VSHI_ARRAY(m->owner, s->count), VSHI_ARRAY(m->perimeter, count),
                                  VSHI_ARRAY(m->version, count), VSHI_ARRAY(m->trials, count / 2 + 1)};
     VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
@@ -267,8 +260,8 @@ static bool are_promising(const merging *m, const border *pair) {
     const double pa = m->perimeter[pair->a], pb = m->perimeter[pair->b], aa = m->patches->list[pair->a].area,
                  ab = m->patches->list[pair->b].area, joined = pa + pb - 2.0 * pair->length;
     const double roundness = joined * joined / (aa + ab), before = (pa * pa + pb * pb) / (aa + ab);
-    return aa + ab < m->max_area && pair->shared > LEAST_SHARED &&
-           (roundness < ROUND || roundness < NO_WORSE * before) && !has_failed(m, pair->a, pair->b);
+    return pair->shared > LEAST_SHARED && (roundness < ROUND || roundness < NO_WORSE * before) &&
+           !has_failed(m, pair->a, pair->b);
 }
 
 /* Borders by pairs of charts. */
@@ -548,64 +541,22 @@ done:
     return result;
 }
 
-/* World units², of meshes begin … end - 1. */
-static double sum_areas(const vshi_shapes *shapes, size_t begin, size_t end) {
-    double sum = 0.0;
-    for (size_t i = begin; i < end; ++i) {
-        const vshi_shape *shape = &shapes->list[shapes->instances[i].shape];
-        const double scale = shape->surface.scale * shapes->instances[i].scale;
-        double area = 0.0;
-        for (size_t c = 0; c < shape->patches.count; ++c) {
-            area += shape->patches.list[c].area;
-        }
-        sum += area * scale * scale;
-    }
-    return sum;
-}
-
-/* Fills largest[shapes]: the most area of a chart of each shape, world units² of its first mesh. If each
- * object has its own page, the least over the shape's instances. */
-static void find_largest(const making *m, double *largest) {
-    const vshi_shapes *shapes = m->shapes;
-    const bool alone = m->options->atlas == VSH_ATLAS_OBJECTS;
-    const double all = alone ? INFINITY : sum_areas(shapes, 0, shapes->mesh_count);
-    for (size_t i = 0; i < shapes->count; ++i) {
-        largest[i] = LARGEST * all;
-    }
-    for (size_t first = 0, size; alone && first < shapes->mesh_count; first += size) {
-        size = vshi_mesh_object_size(shapes->meshes, first, shapes->mesh_count);
-        const double area = sum_areas(shapes, first, first + size);
-        for (size_t i = first; i < first + size; ++i) {
-            const vshi_instance *instance = &shapes->instances[i];
-            const double own = LARGEST * area / (instance->scale * instance->scale);
-            largest[instance->shape] = fmin(own, largest[instance->shape]);
-        }
-    }
-}
-
 static vsh_result join_all(const making *m, vsh_error *error) {
-    double *largest = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&largest, m->shapes->count, sizeof *largest, what, error));
-    find_largest(m, largest);
     for (size_t i = 0; i < m->shapes->count; ++i) {
         vshi_shape *shape = &m->shapes->list[i];
-        const double scale = shape->surface.scale;
         if (!shape->kept && shape->patches.count > 1) {
-            VSHI_TRY_DONE(merging_begin(&shape->surface, &shape->patches, m->options->max_stretch,
-                                        largest[i] / (scale * scale), &m->charting[i].merging, error));
+            VSHI_TRY(merging_begin(&shape->surface, &shape->patches, m->options->max_stretch,
+                                   &m->charting[i].merging, error));
         }
     }
     size_t rest = 2 * m->triangles, left = 1;
     for (int round = 0; round < MOST_ROUNDS && left > 0; ++round) {
-        VSHI_TRY_DONE(join_round(m, &left, error));
+        VSHI_TRY(join_round(m, &left, error));
         vshi_job_advance(m->job, 2 * m->triangles / MOST_ROUNDS);
         rest -= 2 * m->triangles / MOST_ROUNDS;
     }
     vshi_job_advance(m->job, rest);
-done:
-    free(largest);
-    return result;
+    return VSH_OK;
 }
 
 /* A vshi_element_fn over shapes. */
