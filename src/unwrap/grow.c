@@ -1,6 +1,6 @@
-/* Charts by variational shape approximation (Cohen-Steiner, Alliez and Desbrun, 2004). The costs of growth
- * make charts round and their borders straight, as in Young's and Castaño's chart growers. One chart after
- * the other grows from the largest unit that is left, as far as normals allow. */
+/* Charts grow one after the other, each from the largest unit that is left, as far as normals allow. The
+ * costs of growth are those of variational shape approximation (Cohen-Steiner, Alliez and Desbrun, 2004), and
+ * make charts round and their borders straight, as in Young's and Castaño's chart growers. */
 #include "unwrap/charts.h"
 
 #include "base/memory.h"
