@@ -194,7 +194,7 @@ typedef struct vsh_vdb_entry {
  * its problem. Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: as vsh_grid_read();
- * - VSH_ERROR_LIMIT: a streamed file, which must be read whole, beyond run->memory_limit;
+ * - VSH_ERROR_LIMIT: the reader takes more than run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *entries, size_t capacity,
                                 size_t *count, vsh_error *error);

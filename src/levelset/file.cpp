@@ -13,7 +13,6 @@
 #include <memory>
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/GridDescriptor.h>
-#include <openvdb/io/Stream.h>
 #include <sys/stat.h>
 
 namespace vshi {
@@ -38,7 +37,7 @@ constexpr unsigned char MAGIC[8] = {0x20, 0x42, 0x44, 0x56, 0, 0, 0, 0};
 // linger) and reads past the end of a file that is cut short.
 class GridReader final : public openvdb::io::Archive {
   public:
-    GridReader(const char *path, const vsh_run &run);
+    explicit GridReader(const char *path);
 
     size_t count() const { return entries.size(); }
     std::string name(size_t i) const { return GridDescriptor::nameAsString(entries[i].uniqueName()); }
@@ -49,7 +48,6 @@ class GridReader final : public openvdb::io::Archive {
     double bytes(size_t i);               // in memory, as the file says
     GridBase::Ptr without_tree(size_t i); // metadata and transform
     GridBase::Ptr grid(size_t i);
-    bool is_streamed() const { return streamed; }
 
     const char *const path;
 
@@ -63,11 +61,10 @@ class GridReader final : public openvdb::io::Archive {
     std::filebuf file;
     std::istream stream{&file};
     std::vector<GridDescriptor> entries;
-    std::vector<GridBase::Ptr> grids; // without trees, unless the file is streamed
-    bool streamed = false;
+    std::vector<GridBase::Ptr> grids; // without trees
 };
 
-GridReader::GridReader(const char *path_, const vsh_run &run) : path(path_) {
+GridReader::GridReader(const char *path_) : path(path_) {
     open();
     stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
     openvdb::io::setStreamMetadataPtr(stream, state, false);
@@ -75,19 +72,11 @@ GridReader::GridReader(const char *path_, const vsh_run &run) : path(path_) {
     setFormatVersion(stream); // reading depends on these
     setLibraryVersion(stream);
     setDataCompression(stream);
-    streamed = !inputHasGridOffsets();
-    if (streamed) { // all of it has to be read: at least as much as the file is long
-        check_bytes(run, double(size), path);
-        stream.seekg(0);
-        openvdb::io::Stream all(stream, false);
-        for (const GridBase::Ptr &one : *all.getGrids()) {
-            entries.emplace_back(one->getName(), one->type());
-            grids.push_back(one);
-        }
-    } else {
-        MetaMap().readMeta(stream);
-        list();
+    if (!inputHasGridOffsets()) {
+        refuse(VSH_ERROR_READ, "%s: cannot be read: it is a stream, without the places of its grids", path);
     }
+    MetaMap().readMeta(stream);
+    list();
 }
 
 // Refuses a file that is no .vdb file, or that OpenVDB cannot read.
@@ -145,9 +134,6 @@ void GridReader::list() {
 }
 
 MetaMap GridReader::metadata(size_t i) {
-    if (streamed) {
-        return *grids[i];
-    }
     entries[i].seekToGrid(stream);
     readGridCompression(stream);
     MetaMap metadata;
@@ -163,21 +149,16 @@ double GridReader::bytes(size_t i) {
 
 GridBase::Ptr GridReader::without_tree(size_t i) {
     const GridBase::Ptr result = grids[i]->copyGrid();
-    if (!streamed) {
-        entries[i].seekToGrid(stream);
-        readGridCompression(stream);
-        result->readMeta(stream);
-        if (openvdb::io::getFormatVersion(stream) >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
-            result->readTransform(stream); // behind the tree in older files
-        }
+    entries[i].seekToGrid(stream);
+    readGridCompression(stream);
+    result->readMeta(stream);
+    if (openvdb::io::getFormatVersion(stream) >= openvdb::OPENVDB_FILE_VERSION_GRID_INSTANCING) {
+        result->readTransform(stream); // behind the tree in older files
     }
     return result;
 }
 
 GridBase::Ptr GridReader::grid(size_t i) {
-    if (streamed) {
-        return grids[i];
-    }
     const GridDescriptor &entry = entries[i];
     const GridBase::Ptr result = grids[i]->copyGrid();
     entry.seekToGrid(stream);
@@ -201,10 +182,10 @@ GridBase::Ptr GridReader::grid(size_t i) {
 
 // Calls read(reader) with a file's grids. Reading past the end of the file is an exception whose text does
 // not help.
-template <typename Read> auto read_file(const char *path, const vsh_run &run, const Read &read) {
+template <typename Read> auto read_file(const char *path, const Read &read) {
     initialize();
     try {
-        GridReader reader(path, run);
+        GridReader reader(path);
         return read(reader);
     } catch (const std::ios_base::failure &) {
         refuse(VSH_ERROR_READ, "%s: cut short or damaged", path);
@@ -333,8 +314,7 @@ namespace {
 bool is_empty(GridReader &reader, size_t i) {
     const auto voxels =
         reader.metadata(i).getMetadata<openvdb::Int64Metadata>(GridBase::META_FILE_VOXEL_COUNT);
-    const bool suspect = voxels ? voxels->value() == 0 : reader.is_streamed();
-    return suspect && reader.grid(i)->constBaseTree().leafCount() == 0;
+    return voxels && voxels->value() == 0 && reader.grid(i)->constBaseTree().leafCount() == 0;
 }
 
 struct Choice {
@@ -376,7 +356,7 @@ Choice choose_level_set(GridReader &reader, const char *name) {
 } // namespace
 
 LevelSet load_level_set(const char *path, const char *name, Stage &stage) {
-    return read_file(path, stage.options, [&](GridReader &reader) {
+    return read_file(path, [&](GridReader &reader) {
         const Choice choice = choose_level_set(reader, name);
         LevelSet loaded{{path, reader.name(choice.grid)}, nullptr, {}, 0.0};
         check_bytes(stage.options, reader.bytes(choice.grid), loaded.name.text().c_str());
@@ -396,7 +376,7 @@ LevelSet load_level_set(const char *path, const char *name, Stage &stage) {
 
 size_t list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entry> &entries,
                   size_t capacity) {
-    return read_file(path, run, [&](GridReader &reader) {
+    return read_file(path, [&](GridReader &reader) {
         for (size_t i = 0; i < std::min(capacity, reader.count()); ++i) {
             Stage stage(run, "load");
             stage.check();
@@ -408,7 +388,7 @@ size_t list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entr
 }
 
 GridBase::Ptr read_numbers(const char *path, const char *name, const vsh_run &run) {
-    return read_file(path, run, [&](GridReader &reader) {
+    return read_file(path, [&](GridReader &reader) {
         const size_t chosen =
             choose(reader, name, [&](size_t i) { return has_numbers(*reader.without_tree(i)); });
         const std::string what = GridName{path, reader.name(chosen)}.text();
