@@ -11,7 +11,7 @@ enum { MEBIBYTE = 1 << 20 };
 
 /* Takes so many bytes, and returns how many of them are in memory. */
 static uint64_t hold(vsh_run *run, const char *folder, size_t bytes) {
-    char *copy = folder != NULL ? strdup(folder) : NULL;
+    FREED char *copy = folder != NULL ? strdup(folder) : NULL;
     vshi_store store = {.run = run, .folder = copy};
     unsigned char *memory = NULL;
     assert_ok(vshi_store_take(&store, (void **)&memory, bytes, 1, "planes", &failure));
