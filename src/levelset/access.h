@@ -49,24 +49,20 @@ typedef struct vshi_block {
     uint64_t mask[VSHI_MASK_WORDS];
 } vshi_block;
 
-/* The blocks of the voxels, sorted by origin (x, then y, then z). */
-const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count);
+struct vsh_voxels {
+    const vshi_block *blocks; /* [info.blocks], sorted by origin (x, then y, then z) */
+    double matrix[12];        /* from index space to the world: three rows of four */
+    vsh_voxels_info info;
+};
 
-/* Number of the block with this origin, or SIZE_MAX. This and the next three functions are thread safe. */
-size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]);
-
-/* Longest axis of a voxel, world units. */
-double vshi_voxels_longest_axis(const vsh_voxels *voxels);
-
-/* A ball that holds the centres of all voxels of a block. */
-void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius);
-
-/* World position of a voxel's centre, where it is shaded. Cannot fail. */
-void vshi_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]);
-
-/* Centres of `count` voxels of a block, by their numbers in it. */
-void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
-                         double (*centres)[3]);
+/* World position of a voxel's centre, where it is shaded. */
+static inline void vshi_voxels_centre(const struct vsh_voxels *voxels, const int32_t index[3],
+                                      double centre[3]) {
+    for (int row = 0; row < 3; ++row) {
+        const double *m = voxels->matrix + 4 * row;
+        centre[row] = m[0] * index[0] + m[1] * index[1] + m[2] * index[2] + m[3];
+    }
+}
 
 /* Name and metadata of one grid of a volume. Strings are copied. */
 typedef struct vshi_channel {

@@ -106,14 +106,8 @@ VSH_BEGIN_C
          (volume, channel, block, voxel))                                                                    \
     GIVE(float *, vshi_volume_values, (vsh_volume * volume, size_t channel, size_t block),                   \
          (volume, channel, block))                                                                           \
-    GIVE(const vshi_block *, vshi_voxels_blocks, (const vsh_voxels *voxels, size_t *count), (voxels, count)) \
-    GIVE(size_t, vshi_voxels_find, (const vsh_voxels *voxels, const int32_t origin[3]), (voxels, origin))    \
-    GIVE(double, vshi_voxels_longest_axis, (const vsh_voxels *voxels), (voxels))                             \
     DO(vsh_grid_get_info, (const vsh_grid *grid, vsh_grid_info *info), (grid, info))                         \
     DO(vsh_grid_free, (vsh_grid * grid), (grid))                                                             \
-    DO(vsh_voxels_get_info, (const vsh_voxels *voxels, vsh_voxels_info *info), (voxels, info))               \
-    DO(vshi_voxels_centre, (const vsh_voxels *voxels, const int32_t index[3], double centre[3]),             \
-       (voxels, index, centre))                                                                              \
     DO(vsh_voxels_free, (vsh_voxels * voxels), (voxels))                                                     \
     DO(vsh_volume_get_info, (const vsh_volume *volume, vsh_volume_info *info), (volume, info))               \
     DO(vsh_volume_get_grid, (const vsh_volume *volume, size_t grid, vsh_volume_grid *info),                  \
@@ -125,12 +119,7 @@ VSH_BEGIN_C
     DO(vshi_volume_set_tile, (vsh_volume * volume, size_t channel, size_t block, float value),               \
        (volume, channel, block, value))                                                                      \
     DO(vshi_volume_settle, (vsh_volume * volume, size_t block, const uint64_t mask[VSHI_MASK_WORDS]),        \
-       (volume, block, mask))                                                                                \
-    DO(vshi_voxels_ball, (const vsh_voxels *voxels, size_t block, double centre[3], double *radius),         \
-       (voxels, block, centre, radius))                                                                      \
-    DO(vshi_voxels_centres,                                                                                  \
-       (const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel, double(*centres)[3]),   \
-       (voxels, block, count, voxel, centres))
+       (volume, block, mask))
 
 #define VSHI_MEMBER_MAKE(name, parameters, arguments, none) vsh_result(*name) parameters;
 #define VSHI_MEMBER_GIVE(result, name, parameters, arguments) result(*name) parameters;

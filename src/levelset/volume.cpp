@@ -35,14 +35,18 @@ struct VoxelSet {
     double least_axis = 0.0; // shortest axis of a voxel, world units
 };
 
+// The content of a vsh_voxels handle.
+struct Voxels : vsh_voxels {
+    std::shared_ptr<const VoxelSet> set;
+};
+
+const std::shared_ptr<const VoxelSet> &set_of(const vsh_voxels *voxels) {
+    return static_cast<const Voxels *>(voxels)->set;
+}
+
 } // namespace
 
 } // namespace vshi
-
-struct vsh_voxels {
-    std::shared_ptr<const vshi::VoxelSet> set;
-    vsh_voxels_info info;
-};
 
 struct vsh_volume {
     std::shared_ptr<const vshi::VoxelSet> set;
@@ -122,10 +126,15 @@ vsh_voxels *close_voxels(VoxelSet &&set, bool normals, const char *what) {
     }
     set.blocks.shrink_to_fit();
     info.blocks = set.blocks.size();
-    info.bytes = sizeof(vsh_voxels) + sizeof set + set.blocks.size() * sizeof(vshi_block);
+    info.bytes = sizeof(Voxels) + sizeof set + set.blocks.size() * sizeof(vshi_block);
     info.has_normals = normals;
     set.least_axis = std::min({info.voxel_size[0], info.voxel_size[1], info.voxel_size[2]});
-    return new vsh_voxels{std::make_shared<const VoxelSet>(std::move(set)), info};
+    auto made = std::make_unique<Voxels>();
+    made->set = std::make_shared<const VoxelSet>(std::move(set));
+    made->blocks = made->set->blocks.data();
+    std::copy(made->set->matrix.begin(), made->set->matrix.end(), made->matrix);
+    made->info = info;
+    return made.release();
 }
 
 // --- the band of a level set
@@ -401,63 +410,13 @@ vsh_result vshi_serve_voxels(const char *path, vshi_decoder *request, const vsh_
 }
 
 void vsh_voxels_free(vsh_voxels *voxels) {
-    delete voxels;
-}
-
-void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
-    *info = voxels->info;
-}
-
-void vshi_voxels_centre(const vsh_voxels *voxels, const int32_t index[3], double centre[3]) {
-    const vshi::Vec3d at = vshi::apply(voxels->set->matrix.data(), vshi::Vec3d(index[0], index[1], index[2]));
-    std::copy(at.asPointer(), at.asPointer() + 3, centre);
-}
-
-const vshi_block *vshi_voxels_blocks(const vsh_voxels *voxels, size_t *count) {
-    *count = voxels->set->blocks.size();
-    return voxels->set->blocks.data();
-}
-
-size_t vshi_voxels_find(const vsh_voxels *voxels, const int32_t origin[3]) {
-    const auto &blocks = voxels->set->blocks;
-    const vshi_block wanted{{origin[0], origin[1], origin[2]}, {}};
-    const auto at = std::lower_bound(blocks.begin(), blocks.end(), wanted, vshi::comes_before<vshi_block>);
-    return at != blocks.end() && std::equal(at->origin, at->origin + 3, origin) ? size_t(at - blocks.begin())
-                                                                                : SIZE_MAX;
-}
-
-double vshi_voxels_longest_axis(const vsh_voxels *voxels) {
-    const double *size = voxels->info.voxel_size;
-    return std::max({size[0], size[1], size[2]});
-}
-
-void vshi_voxels_centres(const vsh_voxels *voxels, size_t block, size_t count, const uint16_t *voxel,
-                         double (*centres)[3]) {
-    const int32_t *origin = voxels->set->blocks[block].origin;
-    for (size_t i = 0; i < count; ++i) {
-        const int32_t at[3] = {origin[0] + (voxel[i] >> 6), origin[1] + (voxel[i] >> 3 & 7),
-                               origin[2] + (voxel[i] & 7)};
-        vshi_voxels_centre(voxels, at, centres[i]);
-    }
-}
-
-void vshi_voxels_ball(const vsh_voxels *voxels, size_t block, double centre[3], double *radius) {
-    const openvdb::Coord low(voxels->set->blocks[block].origin);
-    const double *matrix = voxels->set->matrix.data();
-    const vshi::Vec3d middle = vshi::apply(matrix, low.asVec3d() + vshi::Vec3d(3.5));
-    double square = 0.0;
-    for (int corner = 0; corner < 8; ++corner) { // centres lie within their hull
-        const vshi::Vec3d at((corner & 1) * 7.0, (corner >> 1 & 1) * 7.0, (corner >> 2) * 7.0);
-        square = std::max(square, (vshi::apply(matrix, low.asVec3d() + at) - middle).lengthSqr());
-    }
-    std::copy(middle.asPointer(), middle.asPointer() + 3, centre);
-    *radius = std::sqrt(square);
+    delete static_cast<vshi::Voxels *>(voxels);
 }
 
 vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *channels, size_t count,
                              const vsh_run *run, double held, vsh_volume **volume, vsh_error *error) {
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
-        const size_t blocks = voxels->set->blocks.size();
+        const size_t blocks = voxels->info.blocks;
         const double bytes =
             held + double(voxels->info.bytes) +
             double(blocks) * double(count) * (vshi::BYTES_PER_LEAF + double(sizeof(vshi::Slot)));
@@ -465,7 +424,7 @@ vsh_result vshi_volume_begin(const vsh_voxels *voxels, const vshi_channel *chann
                                  std::to_string(voxels->info.count) + " voxels";
         vshi::check_bytes(*run, bytes, what.c_str());
         auto made = std::make_unique<vsh_volume>();
-        made->set = voxels->set;
+        made->set = vshi::set_of(voxels);
         made->channels = std::vector<vshi::Channel>(count);
         for (size_t c = 0; c < count; ++c) {
             made->channels[c].what = channels[c];

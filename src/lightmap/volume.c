@@ -164,6 +164,16 @@ static uint16_t every_third(unsigned place) {
     return (uint16_t)((place & 1) | (place >> 2 & 2) | (place >> 4 & 4));
 }
 
+static void find_centres(const volume_bake *bake, size_t block, size_t count, const uint16_t *voxel,
+                         double (*centre)[3]) {
+    const int32_t *origin = bake->blocks[block].origin;
+    for (size_t i = 0; i < count; ++i) {
+        const int32_t at[3] = {origin[0] + (voxel[i] >> 6), origin[1] + (voxel[i] >> 3 & 7),
+                               origin[2] + (voxel[i] & 7)};
+        vshi_voxels_centre(bake->voxels, at, centre[i]);
+    }
+}
+
 /* Lists the block's voxels along Morton's curve (1966): 4, 16 and 64 that follow each other lie close
  * together.
  */
@@ -175,7 +185,7 @@ static void list_voxels(const volume_bake *bake, piece *p) {
             p->voxel[p->count++] = (uint16_t)(64 * x + 8 * y + z);
         }
     }
-    vshi_voxels_centres(bake->voxels, p->block, p->count, p->voxel, p->centre);
+    find_centres(bake, p->block, p->count, p->voxel, p->centre);
 }
 
 /* Keeps voxel i as the next of `kept`. */
@@ -354,6 +364,27 @@ static bool shade_block(volume_bake *bake, piece *p, const facts *known, vsh_sha
     return true;
 }
 
+/* A ball that holds the centres of all voxels of a block. */
+static void find_ball(const volume_bake *bake, size_t block, double centre[3], double *radius) {
+    const int32_t *low = bake->blocks[block].origin;
+    const int32_t high[3] = {low[0] + 7, low[1] + 7, low[2] + 7};
+    double corner[8][3];
+    vshi_vec sum = {0.0, 0.0, 0.0};
+    for (int i = 0; i < 8; ++i) {
+        const int32_t at[3] = {(i & 1 ? high : low)[0], (i & 2 ? high : low)[1], (i & 4 ? high : low)[2]};
+        vshi_voxels_centre(bake->voxels, at, corner[i]);
+        sum = vshi_add(sum, vshi_vec_of(corner[i]));
+    }
+    const vshi_vec middle = vshi_scale(sum, 0.125);
+    *radius = 0.0;
+    for (int i = 0; i < 8; ++i) {
+        *radius = fmax(*radius, vshi_length(vshi_sub(vshi_vec_of(corner[i]), middle)));
+    }
+    centre[0] = middle.x;
+    centre[1] = middle.y;
+    centre[2] = middle.z;
+}
+
 /* Finds facts by balls around the blocks, in free space. */
 static void find_facts(const volume_bake *bake, size_t begin, size_t count, facts *known,
                        vsh_shade_stats *stats) {
@@ -361,7 +392,7 @@ static void find_facts(const volume_bake *bake, size_t begin, size_t count, fact
     float distance[GRAIN];
     int8_t proof[GRAIN];
     for (size_t i = 0; i < count; ++i) {
-        vshi_voxels_ball(bake->voxels, begin + i, centre[i], &radius[i]);
+        find_ball(bake, begin + i, centre[i], &radius[i]);
     }
     bound_solid(bake, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
@@ -457,13 +488,24 @@ static void list_steps(volume_bake *bake) {
     }
 }
 
+static int compare_origins(const void *a, const void *b) {
+    const vshi_block *x = a, *y = b;
+    for (int axis = 0; axis < 3; ++axis) {
+        if (x->origin[axis] != y->origin[axis]) {
+            return x->origin[axis] < y->origin[axis] ? -1 : 1;
+        }
+    }
+    return 0;
+}
+
 /* The numbers of the blocks around one, which is in the middle; SIZE_MAX: there is none. */
 static void find_around(const volume_bake *bake, size_t block, size_t around[27]) {
     const int32_t *origin = bake->blocks[block].origin;
     for (int i = 0; i < 27; ++i) {
-        const int32_t at[3] = {origin[0] + 8 * (i / 9 - 1), origin[1] + 8 * (i / 3 % 3 - 1),
-                               origin[2] + 8 * (i % 3 - 1)};
-        around[i] = vshi_voxels_find(bake->voxels, at);
+        const vshi_block at = {.origin = {origin[0] + 8 * (i / 9 - 1), origin[1] + 8 * (i / 3 % 3 - 1),
+                                          origin[2] + 8 * (i % 3 - 1)}};
+        const vshi_block *found = bsearch(&at, bake->blocks, bake->block_count, sizeof at, compare_origins);
+        around[i] = found != NULL ? (size_t)(found - bake->blocks) : SIZE_MAX;
     }
 }
 
@@ -489,10 +531,10 @@ enum { NO_REACH = 255 };
  * distance bounds it. NO_REACH means that no shaded voxel is close enough. */
 static void find_reaches(const volume_bake *bake, size_t block, const uint16_t *voxel, size_t count,
                          uint8_t *reaches) {
-    const double longest = vshi_voxels_longest_axis(bake->voxels);
+    const double *size = bake->voxels->info.voxel_size, longest = fmax(size[0], fmax(size[1], size[2]));
     double centre[VSHI_BLOCK_VOXELS][3];
     float distance[VSHI_BLOCK_VOXELS];
-    vshi_voxels_centres(bake->voxels, block, count, voxel, centre);
+    find_centres(bake, block, count, voxel, centre);
     sample_solid(bake, count, &centre[0][0], distance);
     for (size_t i = 0; i < count; ++i) {
         const double inside = -(double)distance[i] - DISTANCE_ERROR * bake->caster_voxel_size;
@@ -707,6 +749,10 @@ static vsh_result prepare(volume_bake *bake, const vsh_light *lights, vsh_error 
     return check_names(lights, bake->light_count, error);
 }
 
+void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info) {
+    *info = voxels->info;
+}
+
 vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *voxels, const vsh_light *lights,
                            size_t light_count, const vsh_volume_options *options, const vsh_run *run,
                            vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
@@ -717,7 +763,6 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
     VSHI_NEEDS(voxels);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
-    vsh_voxels_info info;
     volume_bake bake = {.occluders = occluders,
                         .voxels = voxels,
                         .light_count = light_count,
@@ -730,9 +775,9 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     bake.one.threads = 1;
     bake.one.isa = full.isa;
-    vsh_voxels_get_info(voxels, &info);
-    bake.normals = info.has_normals != 0;
-    bake.blocks = vshi_voxels_blocks(voxels, &bake.block_count);
+    bake.normals = voxels->info.has_normals != 0;
+    bake.blocks = voxels->blocks;
+    bake.block_count = voxels->info.blocks;
     find_half_axes(&bake);
     find_voxel_size(&bake);
     VSHI_TRY_DONE(prepare(&bake, lights, error));

@@ -177,18 +177,14 @@ TEST(lists_voxels_and_texts_are_the_same) {
     const Both<vsh_voxels> voxels(vsh_voxels_free, [&](const vsh_run *run, vsh_voxels **made) {
         return vsh_voxels_from_vdb(path.c_str(), nullptr, run, made, &failure);
     });
-    const vshi_block *left = vshi_voxels_blocks(voxels.here, &counts[0]);
-    const vshi_block *right = vshi_voxels_blocks(voxels.there, &counts[1]);
-    assert_int_equal(counts[0], counts[1]);
-    for (size_t i = 0; i < counts[0]; ++i) {
-        assert_same_info(left[i].origin, right[i].origin);
-        assert_same_info(left[i].mask, right[i].mask);
+    const vsh_voxels &here = *voxels.here, &there = *voxels.there;
+    assert_int_equal(here.info.blocks, there.info.blocks);
+    for (size_t i = 0; i < here.info.blocks; ++i) {
+        assert_same_info(here.blocks[i].origin, there.blocks[i].origin);
+        assert_same_info(here.blocks[i].mask, there.blocks[i].mask);
     }
-    vsh_voxels_info info[2];
-    vsh_voxels_get_info(voxels.here, &info[0]);
-    vsh_voxels_get_info(voxels.there, &info[1]);
-    assert_same_info(info[0].bounds_min, info[1].bounds_min);
-    assert_same_info(info[0].voxel_size, info[1].voxel_size);
+    assert_same_info(here.info.bounds_min, there.info.bounds_min);
+    assert_same_info(here.info.voxel_size, there.info.voxel_size);
 
     const Both<vsh_outline> outline(vsh_outline_free, [&](const vsh_run *run, vsh_outline **made) {
         return vshi_outline_from_text("Ag&8\nx", FONT.c_str(), nullptr, run, made, &failure);
