@@ -16,6 +16,8 @@
 #include <unistd.h>
 #include <vdbshade/vdbshade.h>
 
+#include <vdbshade/vdbshade.h>
+
 VSH_BEGIN_C
 #include <cmocka.h>
 
