@@ -225,7 +225,10 @@ static int64_t write_bytes(exr_const_context_t context, void *user, const void *
     return (int64_t)size;
 }
 
-enum { MAX_CHUNK_LINES = 16 }; /* ZIP's */
+enum {
+    MAX_CHUNK_LINES = 16, /* ZIP's */
+    ZIP_LEVEL = 3         /* half the time of OpenEXR's default, 4, for 6 % more bytes */
+};
 
 typedef struct exr_writer {
     vshi_sink sink;
@@ -266,6 +269,7 @@ static exr_result_t write_header(exr_writer *writer, const vshi_planes *planes) 
     keep_first(&status, exr_add_part(file, NULL, EXR_STORAGE_SCANLINE, &writer->part));
     keep_first(&status, exr_initialize_required_attr_simple(file, writer->part, planes->width, planes->height,
                                                             EXR_COMPRESSION_ZIP));
+    keep_first(&status, exr_set_zip_compression_level(file, writer->part, ZIP_LEVEL));
     keep_first(&status, exr_attr_set_string(file, writer->part, "software", software));
     for (size_t i = 0; i < planes->attribute_count; ++i) {
         keep_first(&status, exr_attr_set_string(file, writer->part, planes->attributes[i].name,
