@@ -1,5 +1,5 @@
-/* Reads PLY (G. Turk, "The PLY polygon file format", 1994): vertices, and faces or the strips (element
- * tristrips) of Stanford's scans. */
+/* Reads PLY (G. Turk, "The PLY polygon file format", 1994): vertices and faces. Assimp 5.2 repeats or invents
+ * the faces and vertices that a file lacks at its end. */
 #include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/memory.h"
@@ -19,13 +19,9 @@ enum {
     ROLE_NX = 3,
     ROLE_U = 6,
     ROLE_NUMBERS = 8,
-    ROLE_CORNERS = ROLE_NUMBERS, /* lists */
-    ROLE_TEXCOORDS,
-    ROLE_STRIP,
+    ROLE_CORNERS = ROLE_NUMBERS, /* a list */
     ROLE_NONE
 };
-
-enum { MOST_TEXCOORDS = 8 }; /* values of a face: two for each corner */
 
 typedef struct ply_reader {
     const char *path;
@@ -44,12 +40,8 @@ typedef struct ply_reader {
     vshi_faces faces;
     /* the current row */
     const char *at, *end;
-    int64_t last[2]; /* indices of the strip, after `length` of them */
-    size_t length;
     float number[ROLE_NUMBERS];
-    size_t corners; /* of the face, or of the strip's triangles */
-    float texcoord[MOST_TEXCOORDS];
-    size_t texcoords;
+    size_t corners; /* of the face */
 } ply_reader;
 
 /* --- the header */
@@ -67,14 +59,10 @@ static const struct {
 
 static int find_role(const char *element, const vshi_ply_property *property) {
     const bool list = property->count_type >= 0;
-    if (strcmp(element, "tristrips") == 0) {
-        return ROLE_STRIP;
-    }
-    if (strcmp(element, "face") == 0 && list) {
+    if (strcmp(element, "face") == 0 && list && property->type < VSHI_PLY_FLOAT) {
         return strcmp(property->name, "vertex_index") == 0 || strcmp(property->name, "vertex_indices") == 0
                    ? ROLE_CORNERS
-               : strcmp(property->name, "texcoord") == 0 ? ROLE_TEXCOORDS
-                                                         : ROLE_NONE;
+                   : ROLE_NONE;
     }
     for (size_t i = 0; strcmp(element, "vertex") == 0 && !list && i < sizeof names / sizeof names[0]; ++i) {
         if (strcmp(property->name, names[i].name) == 0) {
@@ -82,24 +70,6 @@ static int find_role(const char *element, const vshi_ply_property *property) {
         }
     }
     return ROLE_NONE;
-}
-
-/* Strips replace faces, so a file cannot have both. Their rows hold one list of vertices. */
-static vsh_result check_strips(const ply_reader *r, const vshi_ply_element *strips, vsh_error *error) {
-    const vshi_ply_property *list = &r->head.property[strips->first];
-    bool others = false;
-    for (int e = 0; e < r->head.elements; ++e) {
-        const vshi_ply_element *other = &r->head.element[e];
-        others = others || strcmp(other->name, "face") == 0 ||
-                 (other != strips && strcmp(other->name, "tristrips") == 0);
-    }
-    return strips->end == strips->first + 1 && list->count_type >= 0 && list->type < VSHI_PLY_FLOAT && !others
-               ? VSH_OK
-               : vshi_fail(
-                     error, VSH_ERROR_UNSUPPORTED,
-                     "%s: its triangles are strips ('tristrips') that are no single list of indices, or "
-                     "stand beside faces: save it with faces, from MeshLab or Blender",
-                     r->path);
 }
 
 static vsh_result find_roles(ply_reader *r, const vshi_ply_element *element, vsh_error *error) {
@@ -116,8 +86,12 @@ static vsh_result find_roles(ply_reader *r, const vshi_ply_element *element, vsh
     }
     return r->vertices > UINT32_MAX
                ? vshi_fail(error, VSH_ERROR_LIMIT, "%s: more than %u vertices", r->path, UINT32_MAX)
-           : element->count > 0 && strcmp(element->name, "tristrips") == 0 ? check_strips(r, element, error)
-                                                                           : VSH_OK;
+           : element->count > 0 && strcmp(element->name, "tristrips") == 0
+               ? vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                           "%s: its triangles are strips ('tristrips'): save it with faces, from MeshLab or "
+                           "Blender",
+                           r->path)
+               : VSH_OK;
 }
 
 static vsh_result read_header(ply_reader *r, vsh_error *error) {
@@ -168,50 +142,22 @@ static vsh_result fail_value(const ply_reader *r, vshi_token token, const char *
                      r->element->name, r->row, VSHI_TOKEN_ARGS(token), expected);
 }
 
-static vsh_result push_corner(ply_reader *r, uint32_t corner, vsh_error *error) {
-    vshi_faces *faces = &r->faces;
-    const size_t at = faces->count + r->corners++;
-    VSHI_TRY(VSHI_GROW(&r->budget, faces->corners, faces->capacity, at + 1, error));
-    faces->corners[at] = corner;
-    return VSH_OK;
-}
-
-/* Adds the next index of a strip. Every second triangle of a strip runs the other way around. Leaves out
- * triangles of fewer than three vertices, which join strips. */
-static vsh_result push_strip(ply_reader *r, int64_t index, vsh_error *error) {
-    const int64_t a = r->last[0], b = r->last[1];
-    r->last[0] = b;
-    r->last[1] = index;
-    if (r->length++ < 2 || a == b || b == index || a == index) {
-        return VSH_OK;
-    }
-    const bool odd = r->length % 2 == 0;
-    VSHI_TRY(push_corner(r, (uint32_t)(odd ? b : a), error));
-    VSHI_TRY(push_corner(r, (uint32_t)(odd ? a : b), error));
-    return push_corner(r, (uint32_t)index, error);
-}
-
-static vsh_result push_index(ply_reader *r, int role, int64_t index, vsh_error *error) {
-    if (role == ROLE_STRIP && index == -1) { /* begins another strip */
-        r->length = 0;
-        return VSH_OK;
-    }
+static vsh_result push_index(ply_reader *r, int64_t index, vsh_error *error) {
     if (index < 0 || (uint64_t)index >= r->vertices) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: %s %" PRIu64 " uses vertex %" PRId64 ", but there are only %" PRIu64, r->path,
                          r->element->name, r->row, index, r->vertices);
     }
-    return role == ROLE_STRIP ? push_strip(r, index, error) : push_corner(r, (uint32_t)index, error);
+    vshi_faces *faces = &r->faces;
+    const size_t at = faces->count + r->corners++;
+    VSHI_TRY(VSHI_GROW(&r->budget, faces->corners, faces->capacity, at + 1, error));
+    faces->corners[at] = (uint32_t)index;
+    return VSH_OK;
 }
 
-static void push_number(ply_reader *r, int role, float number) {
+static void set_number(ply_reader *r, int role, float number) {
     if (role < ROLE_NUMBERS) {
         r->number[role] = number;
-    } else if (role == ROLE_TEXCOORDS) {
-        if (r->texcoords < MOST_TEXCOORDS) {
-            r->texcoord[r->texcoords] = number;
-        }
-        ++r->texcoords;
     }
 }
 
@@ -222,10 +168,10 @@ static vsh_result read_text_value(ply_reader *r, int role, vsh_error *error) {
     if (token.text == NULL) {
         return fail_short(r, error);
     }
-    if (role == ROLE_CORNERS || role == ROLE_STRIP) {
+    if (role == ROLE_CORNERS) {
         int64_t index;
-        return vshi_token_integer(token, &index) && (index >= 0 || role == ROLE_STRIP)
-                   ? push_index(r, role, index, error)
+        return vshi_token_integer(token, &index) && index >= 0
+                   ? push_index(r, index, error)
                    : fail_value(r, token, "an index of a vertex", error);
     }
     float number;
@@ -235,7 +181,7 @@ static vsh_result read_text_value(ply_reader *r, int role, vsh_error *error) {
                        : !is_number && vshi_token_number(token) != VSHI_NUMBER_NOT_FINITE) {
         return fail_value(r, token, "a finite number", error);
     }
-    push_number(r, role, is_number ? number : NAN);
+    set_number(r, role, is_number ? number : NAN);
     return VSH_OK;
 }
 
@@ -259,15 +205,6 @@ static vsh_result read_text_property(ply_reader *r, const vshi_ply_property *pro
 
 /* --- binary */
 
-/* Reads an index. One that is a float (no known program writes them) must be whole. */
-static int64_t read_index(const char *at, int type, bool big_endian) {
-    if (type < VSHI_PLY_FLOAT) {
-        return vshi_bytes_integer(at, 1 << type / 2, type % 2 == 0, big_endian);
-    }
-    const float number = (float)vshi_ply_number(at, type, big_endian);
-    return number >= 0.0F && number <= 16777216.0F && floorf(number) == number ? (int64_t)number : -2;
-}
-
 static vsh_result read_binary_property(ply_reader *r, const vshi_ply_property *property, int role,
                                        vsh_error *error) {
     const bool big = r->head.big_endian;
@@ -287,10 +224,10 @@ static vsh_result read_binary_property(ply_reader *r, const vshi_ply_property *p
     const char *at = r->at;
     r->at += values * (uint64_t)size;
     for (; role != ROLE_NONE && at < r->at; at += size) {
-        if (role != ROLE_CORNERS && role != ROLE_STRIP) {
-            push_number(r, role, (float)vshi_ply_number(at, property->type, big));
+        if (role != ROLE_CORNERS) {
+            set_number(r, role, (float)vshi_ply_number(at, property->type, big));
         } else {
-            VSHI_TRY(push_index(r, role, read_index(at, property->type, big), error));
+            VSHI_TRY(push_index(r, vshi_bytes_integer(at, size, property->type % 2 == 0, big), error));
         }
     }
     return VSH_OK;
@@ -298,7 +235,7 @@ static vsh_result read_binary_property(ply_reader *r, const vshi_ply_property *p
 
 /* Reads a row into the reader's members, and its corners after those of `faces`. */
 static vsh_result read_row(ply_reader *r, vsh_error *error) {
-    r->corners = r->texcoords = r->length = 0;
+    r->corners = 0;
     for (int p = r->element->first; p < r->element->end; ++p) {
         const vshi_ply_property *property = &r->head.property[p];
         VSHI_TRY(r->head.ascii ? read_text_property(r, property, r->roles[p], error)
@@ -307,42 +244,15 @@ static vsh_result read_row(ply_reader *r, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Copies the texture coordinates of a face's corners to its vertices. Later faces overwrite earlier ones. */
-static vsh_result set_texcoords(ply_reader *r, const uint32_t *corners, vsh_error *error) {
-    enum { LEAST = 6 };
-    if (r->texcoords < LEAST || r->texcoords > MOST_TEXCOORDS || r->corners < r->texcoords / 2) {
-        return VSH_OK;
-    }
-    if (r->uvs == NULL && r->vertices <= r->text.size) { /* otherwise the file is too short for them */
-        VSHI_TRY(
-            vshi_reserve(&r->budget, &r->uvs, &r->uv_capacity, (size_t)r->vertices, sizeof(float[2]), error));
-        memset(r->uvs, 0, r->uv_capacity * sizeof(float[2]));
-    }
-    for (size_t i = 0; r->uvs != NULL && i < r->texcoords / 2; ++i) {
-        memcpy(r->uvs + 2 * (size_t)corners[i], r->texcoord + 2 * i, sizeof(float[2]));
-    }
-    return VSH_OK;
-}
-
 static vsh_result add_row(ply_reader *r, int role, vsh_error *error) {
-    vshi_faces *faces = &r->faces;
-    const uint32_t *corners = faces->corners != NULL ? faces->corners + faces->count : NULL;
     if (role < ROLE_NUMBERS) {
         return add_vertex(r, error);
-    }
-    if (role == ROLE_STRIP) {
-        for (size_t i = 0; i < r->corners; i += 3) {
-            faces->count += 3;
-            VSHI_TRY(vshi_faces_end_face(faces, &r->budget, 0, 3, error));
-        }
-        return VSH_OK;
     }
     if (role == ROLE_NONE) {
         return VSH_OK;
     }
-    VSHI_TRY(set_texcoords(r, corners, error));
-    faces->count += r->corners;
-    return vshi_faces_end_face(faces, &r->budget, 0, r->corners, error);
+    r->faces.count += r->corners;
+    return vshi_faces_end_face(&r->faces, &r->budget, 0, r->corners, error);
 }
 
 /* Finds the role of an element's rows: the first of their roles. */
