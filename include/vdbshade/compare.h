@@ -90,14 +90,9 @@ typedef struct vsh_measures {
     double shift[3];                 /* x, y, z, texels: golden's value at p is the new value at p + shift */
     double explained;        /* share of the squared difference that vanishes when the shift is undone */
     vsh_region lost, gained; /* the largest of each */
-    double noise;            /* measured standard error: differences that neighbours along edges lack */
-    double noise_share;      /* its share of the squared difference */
-    double curve[3][2];      /* golden and new value at 1/4, 1/2 and 3/4 of golden's range if a curve (gamma,
-                              * exposure) explains the difference, else 0. The shift, penumbrae and regions
-                              * are then measured after applying the curve to golden */
 } vsh_measures;
 
-/* Measures how far values are from golden ones. Takes 13 bytes a value beside the caller's, and runs under
+/* Measures how far values are from golden ones. Takes 9 bytes a value beside the caller's, and runs under
  * the stage "compare" on one thread. Errors:
  * - VSH_ERROR_ARGUMENT: compared, its planes or measures are NULL; sizes, options or run out of range;
  * - VSH_ERROR_LIMIT: run->memory_limit;

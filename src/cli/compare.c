@@ -254,21 +254,6 @@ static const char *explain_measure(const vsh_channel_comparison *channel, int me
     }
 }
 
-/* Names noise or a curve if it explains most of the difference. */
-static const char *explain_cause(const vsh_channel_comparison *channel) {
-    const vsh_measures *m = &channel->measures;
-    const double(*c)[2] = m->curve;
-    if (c[2][0] > 0.0) {
-        return cli_keep_text(
-            "values follow a curve that takes %.2f, %.2f, %.2f to %.2f, %.2f, %.2f: gamma or exposure?",
-            c[0][0], c[1][0], c[2][0], c[0][1], c[1][1], c[2][1]);
-    }
-    return m->noise_share >= 0.5 && m->noise > channel->limits.options.noise
-               ? cli_keep_text("noise of %.3g, which is %.0f %% of the squared difference", m->noise,
-                               100.0 * m->noise_share)
-               : "";
-}
-
 /* Explains what is wrong with a channel, the best explanation first; "" if nothing is. */
 static const char *explain(const vsh_channel_comparison *channel) {
     const char *text = "";
@@ -285,7 +270,6 @@ static const char *explain(const vsh_channel_comparison *channel) {
         text = join(text, "; ", "nothing is covered in both: nothing was compared");
         return join(text, "; ", explain_nonfinite(channel));
     }
-    text = channel->failed != 0 ? join(text, "; ", explain_cause(channel)) : text;
     for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
         text = (channel->failed >> i & 1) != 0 ? join(text, "; ", explain_measure(channel, i)) : text;
     }
@@ -356,13 +340,6 @@ static json_t *nonfinite(const vsh_channel_comparison *channel, int which) {
                      m->nonfinite[which] > 0 ? position(channel, m->nonfinite_first[which]) : json_null());
 }
 
-static json_t *curve(const vsh_measures *m) {
-    const double(*c)[2] = m->curve;
-    return c[2][0] > 0.0
-               ? json_pack("[[f,f],[f,f],[f,f]]", c[0][0], c[0][1], c[1][0], c[1][1], c[2][0], c[2][1])
-               : json_null();
-}
-
 static json_t *measures(const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     json_t *values = json_object(), *limits = json_object(), *failed = json_array();
@@ -383,12 +360,11 @@ static json_t *measures(const vsh_channel_comparison *channel) {
 
 static json_t *details(const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
-    return json_pack("{s:{s:o,s:f,s:f},s:I,s:{s:o,s:o},s:[f,f,f],s:f,s:f,s:f,s:o,s:o,s:o}", "worst", "at",
+    return json_pack("{s:{s:o,s:f,s:f},s:I,s:{s:o,s:o},s:[f,f,f],s:f,s:o,s:o}", "worst", "at",
                      position(channel, m->worst), "golden", m->worst_value[0], "new", m->worst_value[1],
                      "edges", (json_int_t)m->pairs, "penumbra_width", "golden", cli_number_json(m->width[0]),
                      "new", cli_number_json(m->width[1]), "shift", m->shift[0], m->shift[1], m->shift[2],
-                     "shift_explains", m->explained, "measured_noise", m->noise, "noise_explains",
-                     m->noise_share, "curve", curve(m), "lost", region(channel, &m->lost), "gained",
+                     "shift_explains", m->explained, "lost", region(channel, &m->lost), "gained",
                      region(channel, &m->gained));
 }
 

@@ -5,12 +5,7 @@
  * Mathematical Morphology", 1982). The first finds new shadows, the second lost ones, even one texel wide.
  * Shadows that moved within the reach, or got a little softer, have like values nearby. Touching texels
  * (corners count) that are off by a step or more to one side are a region. Limits: fainter shadows are not
- * seen, and penumbrae that change by many texels are off, too.
- *
- * Two other causes look like regions. Noise is what neighbours along an edge do not share. Each value is
- * compared with its two neighbours in the direction in which the two bakes change least, so wider and shifted
- * penumbrae do not count. A curve (gamma, exposure) takes equal golden values to equal new ones, all lighter
- * or all darker. A penumbra of another width gets lighter on one side and darker on the other. */
+ * seen, and penumbrae that change by many texels are off, too. */
 #include "compare/compare.h"
 
 #include "base/floats.h"
@@ -311,12 +306,12 @@ static vsh_region extract_region(const vshi_pair *pair, float *off, uint32_t *st
     return region;
 }
 
-/* Finds lost and gained regions, excusing the larger of measured and allowed noise. */
+/* Finds lost and gained regions. */
 static void measure_regions(const vshi_pair *pair, const vsh_compare_options *options, void *scratch,
                             vsh_measures *m) {
     float *off = scratch;
     uint32_t *stack = (uint32_t *)(off + pair->count); /* holds no texel twice */
-    const double step = options->step + VSHI_NOISE_P99 * fmax(options->noise, m->noise);
+    const double step = options->step + VSHI_NOISE_P99 * options->noise;
     for (size_t i = 0; i < pair->count; ++i) {
         const size_t reach = (size_t)options->reach;
         const double came = pair->mask[i] ? find_excess(pair, VSHI_NEW, i, reach) : 0.0;
@@ -334,159 +329,6 @@ static void measure_regions(const vshi_pair *pair, const vsh_compare_options *op
     }
     m->value[VSH_MEASURE_LOST] = (double)m->lost.count;
     m->value[VSH_MEASURE_GAINED] = (double)m->gained.count;
-}
-
-/* --- noise */
-
-/* Squares the difference's deviation from the mean of its two neighbours, along the direction in which the
- * bakes change least. Negative if there are no neighbours. */
-static double find_unshared(const vshi_pair *pair, size_t i) {
-    double least = INFINITY, unshared = -1.0;
-    size_t place[3];
-    vshi_find_place(pair, i, place);
-    for (int d = 14; d < (pair->size[2] > 1 ? 27 : 18); ++d) { /* half of 3 × 3 × 3: the rest is opposite */
-        const int front[3] = {d % 3 - 1, d / 3 % 3 - 1, d / 9 - 1},
-                  back[3] = {-front[0], -front[1], -front[2]};
-        size_t at[2];
-        if (!vshi_find_offset(pair, place, back, &at[0]) || !vshi_find_offset(pair, place, front, &at[1]) ||
-            !pair->mask[at[0]] || !pair->mask[at[1]]) {
-            continue;
-        }
-        const double length = front[0] * front[0] + front[1] * front[1] + front[2] * front[2];
-        double steps = 0.0;
-        for (int which = 0; which < 2; ++which) {
-            steps += vshi_value_at(pair, which, at[1]) - vshi_value_at(pair, which, at[0]);
-        }
-        const double change = steps * steps / length;
-        if (change < least) {
-            const double own = vshi_difference_at(pair, i) -
-                               0.5 * (vshi_difference_at(pair, at[0]) + vshi_difference_at(pair, at[1]));
-            least = change;
-            unshared = own * own;
-        }
-    }
-    return unshared;
-}
-
-static void measure_noise(const vshi_pair *pair, vsh_measures *m) {
-    static const double VARIANCE = 1.5; /* 1 of the value, and 1/2 of the mean of its neighbours */
-    double sum = 0.0, all = 0.0, count = 0.0;
-    for (size_t i = 0; i < pair->count; ++i) {
-        const double unshared = pair->mask[i] ? find_unshared(pair, i) : -1.0;
-        if (unshared >= 0.0) {
-            sum += unshared / VARIANCE;
-            all += vshi_difference_at(pair, i) * vshi_difference_at(pair, i);
-            count += 1.0;
-        }
-    }
-    m->noise = count > 0.0 ? sqrt(sum / count) : 0.0;
-    m->noise_share = all > 0.0 ? fmin(sum / all, 1.0) : 0.0;
-}
-
-/* --- a curve */
-
-enum { CURVE_BINS = 64, FEWEST_BINS = 16 }; /* fewer points fit anything */
-static const double LEAST_EXPLAINED = 0.98;
-static const double LEAST_RISE = 0.05; /* share of the rise in each half: a lost shadow has none in one */
-static const double MOST_MIXED =
-    0.1; /* smaller of the sums of lighter and darker, as a share of the larger */
-
-typedef struct curve {
-    int count;
-    double from[CURVE_BINS], to[CURVE_BINS]; /* mean golden and new values of each bin that has any */
-} curve;
-
-static double value_on(const curve *c, double v) {
-    int i = 1;
-    while (i + 1 < c->count && v > c->from[i]) {
-        ++i;
-    }
-    const double t = (v - c->from[i - 1]) / (c->from[i] - c->from[i - 1]);
-    return c->to[i - 1] + t * (c->to[i] - c->to[i - 1]);
-}
-
-/* Averages values in bins of golden's. */
-static void fit_curve(const vshi_pair *pair, curve *c, double counts[CURVE_BINS]) {
-    double low = INFINITY, high = -INFINITY, from[CURVE_BINS] = {0.0}, to[CURVE_BINS] = {0.0},
-           count[CURVE_BINS] = {0.0};
-    for (size_t i = 0; i < pair->count; ++i) {
-        if (pair->mask[i]) {
-            low = fmin(low, vshi_value_at(pair, VSHI_GOLDEN, i));
-            high = fmax(high, vshi_value_at(pair, VSHI_GOLDEN, i));
-        }
-    }
-    for (size_t i = 0; i < pair->count && high > low; ++i) {
-        if (pair->mask[i]) {
-            const double v = vshi_value_at(pair, VSHI_GOLDEN, i);
-            const int bin = (int)fmin((v - low) / (high - low) * CURVE_BINS, CURVE_BINS - 1.0);
-            from[bin] += v;
-            to[bin] += vshi_value_at(pair, VSHI_NEW, i);
-            count[bin] += 1.0;
-        }
-    }
-    c->count = 0;
-    for (int bin = 0; bin < CURVE_BINS; ++bin) {
-        if (count[bin] > 0.0) {
-            c->from[c->count] = from[bin] / count[bin];
-            c->to[c->count] = to[bin] / count[bin];
-            counts[c->count++] = count[bin];
-        }
-    }
-}
-
-/* Whether the curve rises everywhere, and makes values only lighter or only darker, apart from noise. */
-static bool is_tone(const curve *c, const double counts[CURVE_BINS], double noise) {
-    double lighter = 0.0, darker = 0.0;
-    for (int i = 0; i < c->count; ++i) {
-        const double change = c->to[i] - c->from[i];
-        lighter += counts[i] * fmax(0.0, change - noise); /* noise clipped at 0 and 1 has a mean */
-        darker += counts[i] * fmax(0.0, -change - noise);
-        if (i > 0 && c->to[i] < c->to[i - 1] - noise * (1.0 + 3.0 / sqrt(counts[i]))) {
-            return false;
-        }
-    }
-    if (c->count < FEWEST_BINS || fmin(lighter, darker) > MOST_MIXED * fmax(lighter, darker)) {
-        return false;
-    }
-    const double first = c->to[0], last = c->to[c->count - 1], least = LEAST_RISE * (last - first);
-    const double middle = value_on(c, 0.5 * (c->from[0] + c->from[c->count - 1]));
-    return last > first && middle - first >= least && last - middle >= least;
-}
-
-/* Applies the curve to golden, and returns the share of the squared difference that it explains, apart from
- * noise. */
-static double map_golden(const vshi_pair *pair, const curve *c, double noise, float *mapped) {
-    double before = 0.0, after = 0.0, count = 0.0;
-    for (size_t i = 0; i < pair->count; ++i) {
-        const double w = value_on(c, vshi_value_at(pair, VSHI_GOLDEN, i));
-        mapped[i] = (float)(w / pair->scale);
-        if (pair->mask[i]) {
-            const double off = vshi_value_at(pair, VSHI_NEW, i) - w;
-            before += vshi_difference_at(pair, i) * vshi_difference_at(pair, i);
-            after += off * off;
-            count += 1.0;
-        }
-    }
-    const double unshared = noise * noise * count;
-    return before > 2.0 * unshared ? (before - after) / (before - unshared) : 0.0;
-}
-
-/* Fits the curve that takes golden values to new ones. If it explains the difference, replaces the pair's
- * golden plane by mapped[count] with the curve applied, fills m->curve, and returns true. */
-static bool follow_curve(vshi_pair *pair, float *mapped, vsh_measures *m) {
-    curve c;
-    double counts[CURVE_BINS];
-    fit_curve(pair, &c, counts);
-    if (!is_tone(&c, counts, m->noise) || map_golden(pair, &c, m->noise, mapped) < LEAST_EXPLAINED) {
-        return false;
-    }
-    for (int k = 0; k < 3; ++k) {
-        const double low = c.from[0], high = c.from[c.count - 1];
-        m->curve[k][0] = low + 0.25 * (k + 1) * (high - low);
-        m->curve[k][1] = value_on(&c, m->curve[k][0]);
-    }
-    pair->plane[VSHI_GOLDEN] = mapped;
-    return true;
 }
 
 /* --- all measures */
@@ -509,21 +351,15 @@ static vsh_result advance(vshi_job *job, vsh_error *error) {
     return vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
 }
 
-/* A displacement explains more than a curve, so it is measured first: a straight edge that moved fits a
- * curve, too. */
-static vsh_result measure_all(vshi_pair pair, const vsh_compare_options *options, vshi_job *job,
-                              float *mapped, void *scratch, vsh_measures *m, vsh_error *error) {
-    VSHI_TRY(measure_values(&pair, m, error));
+static vsh_result measure_all(const vshi_pair *pair, const vsh_compare_options *options, vshi_job *job,
+                              void *scratch, vsh_measures *m, vsh_error *error) {
+    VSHI_TRY(measure_values(pair, m, error));
     VSHI_TRY(advance(job, error));
-    measure_noise(&pair, m);
-    vshi_measure_shift(&pair, scratch, m);
+    vshi_measure_shift(pair, scratch, m);
     VSHI_TRY(advance(job, error));
-    if (m->value[VSH_MEASURE_SHIFT] == 0.0 && follow_curve(&pair, mapped, m)) {
-        vshi_measure_shift(&pair, scratch, m);
-    }
-    VSHI_TRY(vshi_measure_penumbrae(&pair, options->noise, m, error));
+    VSHI_TRY(vshi_measure_penumbrae(pair, options->noise, m, error));
     VSHI_TRY(advance(job, error));
-    measure_regions(&pair, options, scratch, m);
+    measure_regions(pair, options, scratch, m);
     return advance(job, error);
 }
 
@@ -539,15 +375,13 @@ vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *
     VSHI_TRY(check_pair(compared, &values, error));
     VSHI_TRY(vshi_options_resolve(options, &chosen, sizeof chosen, "options", error));
     VSHI_TRY(check_options(&chosen, error));
-    /* the caller's values and mask, then our mask, mapped values and scratch */
-    VSHI_TRY(vshi_check_limit(&full, values * (9.0 + 1.0 + 4.0 + REGIONS_SCRATCH), "comparison", error));
+    /* the caller's values and mask, then our mask and scratch */
+    VSHI_TRY(vshi_check_limit(&full, values * (9.0 + 1.0 + REGIONS_SCRATCH), "comparison", error));
     const size_t count = (size_t)values;
     uint8_t *mask = NULL;
-    float *mapped = NULL;
     void *scratch = NULL;
     vshi_job *job = NULL;
-    const vshi_array arrays[] = {
-        VSHI_ARRAY(mask, count), VSHI_ARRAY(mapped, count), {&scratch, count, REGIONS_SCRATCH}};
+    const vshi_array arrays[] = {VSHI_ARRAY(mask, count), {&scratch, count, REGIONS_SCRATCH}};
     vsh_result result;
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "comparison", error));
     vshi_pair pair;
@@ -556,12 +390,11 @@ vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *
     if (m.count > 0) {
         job = vshi_job_begin(&full, "compare", 4);
         VSHI_TRY_DONE(job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "comparison: out of memory"));
-        VSHI_TRY_DONE(measure_all(pair, &chosen, job, mapped, scratch, &m, error));
+        VSHI_TRY_DONE(measure_all(&pair, &chosen, job, scratch, &m, error));
     }
     *measures = m;
 done:
     vshi_job_end(job);
-    free(mapped);
     free(scratch);
     free(mask);
     return result;

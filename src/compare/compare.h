@@ -90,9 +90,8 @@ enum { VSHI_MOST_REACH = 16 }; /* of vsh_compare_options.reach */
 /* Fills the measures' shift. `scratch`: 5 bytes a value. */
 void vshi_measure_shift(const vshi_pair *pair, void *scratch, vsh_measures *measures);
 
-/* Fills the measures of penumbrae. `allowed` is the noise that the limits already allow for. Errors:
- * VSH_ERROR_MEMORY. */
-vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_measures *measures,
+/* Fills the measures of penumbrae. `noise` is that which the limits allow for. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double noise, vsh_measures *measures,
                                   vsh_error *error);
 
 /* Adds up golden's penumbra widths and the new values' deviation from them, for vsh_accuracy.width_error. */

@@ -491,7 +491,7 @@ static vsh_result set_box(const files *f, const vsh_vdb_entry *golden, const vsh
         voxels *= side;
     }
     const double bytes =
-        voxels * 30.0; /* two copies with active states, a mask, and those of vsh_compare() */
+        voxels * 26.0; /* two copies with active states, a mask, and those of vsh_compare() */
     if (voxels > (double)INT32_MAX || (f->run.memory_limit > 0 && bytes > (double)f->run.memory_limit)) {
         return vshi_fail(error, VSH_ERROR_LIMIT,
                          "%s: grid '%s': a box of %d × %d × %d voxels holds both: comparing takes about %.0f "

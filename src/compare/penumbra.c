@@ -27,7 +27,6 @@ enum { FEWEST_EDGES = 16 }; /* fewer do not make a mean */
 
 static const double LOW = 0.1, HIGH = 0.9;
 static const double ROOM = 0.02;        /* move of the marks that tests if a width is steady */
-static const double LEAST_NOISE = 0.25; /* share of the squared difference: penumbrae alone make less */
 static const double MOST_ROOM = 0.3;    /* of the range, that each mark moves */
 static const double LEAST_RANGE = 0.05; /* from the darkest to the lightest: less is no shadow */
 static const double REACH = 2.0;        /* texels that narrow edges of a pair may be apart */
@@ -225,10 +224,9 @@ static void set_axis(line *l, int axis) {
     l->count = l->pair->size[axis];
 }
 
-vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_measures *m, vsh_error *error) {
+vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double noise, vsh_measures *m, vsh_error *error) {
     line l = {.pair = pair};
-    const double noise = m->noise_share >= LEAST_NOISE ? m->noise : 0.0;
-    if (!find_sides(pair, fmax(noise, allowed), &l)) {
+    if (!find_sides(pair, noise, &l)) {
         return VSH_OK;
     }
     size_t longest = 1;
@@ -253,11 +251,8 @@ vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double allowed, vsh_mea
         m->width[which] = t.width[which] / (double)t.pairs;
     }
     if (t.pairs >= FEWEST_EDGES) {
-        /* many texels of a wide penumbra may pass a mark: noise moves the mean as far as one edge's width */
-        const double range = (l.sides.high - l.sides.low) / (HIGH - LOW);
-        const double excused = VSHI_NOISE_WIDTH * fmax(0.0, noise - allowed) / range;
         const double ratio = t.width[VSHI_NEW] / t.width[VSHI_GOLDEN];
-        m->value[VSH_MEASURE_PENUMBRA] = fmax(0.0, fmax(ratio, 1.0 / ratio) - 1.0 - excused);
+        m->value[VSH_MEASURE_PENUMBRA] = fmax(ratio, 1.0 / ratio) - 1.0;
     }
     return VSH_OK;
 }
