@@ -50,7 +50,6 @@ vsh_result vshi_lit_open(vshi_lit_work *work, vsh_error *error) {
     size_t size;
     VSHI_TRY(vshi_lit_read(work, &size, error));
     VSHI_TRY(check_lists(&work->gltf, error));
-    work->first_view = json_array_size(json_object_get(work->gltf.root, "bufferViews"));
     json_t *images = json_object_get(work->gltf.root, "images");
     work->own_images = json_copy(images);
     return images != NULL && json_array_size(work->own_images) != json_array_size(images)
@@ -74,12 +73,10 @@ void vshi_lit_work_free(vshi_lit_work *work) {
     free(work->splits.list);
     free(work->uvs.list);
     free(work->looks.list);
-    free(work->dropped.list);
     free(work->added.list);
     vshi_lit_dracos_free(&work->dracos);
     free(work->pages);
     json_decref(work->own_images);
-    free(work->replaced);
     vshi_gltf_free_buffers(&work->gltf);
     json_decref(work->gltf.root);
     free(work->text);
@@ -248,8 +245,8 @@ vsh_result vshi_lit_add_view(vshi_lit_work *work, const void *bytes, size_t size
     if (bytes != NULL) {
         memcpy(work->added.list + at, bytes, size);
     }
-    json_t *made =
-        json_pack("{s:i,s:I,s:I}", "buffer", 0, "byteOffset", (json_int_t)at, "byteLength", (json_int_t)size);
+    json_t *made = json_pack("{s:I,s:I,s:I}", "buffer", (json_int_t)work->gltf.buffer_count, "byteOffset",
+                             (json_int_t)at, "byteLength", (json_int_t)size);
     *view = vshi_lit_append(work, "bufferViews", made);
     if (stride != 0) {
         vshi_lit_set_number(work, made, "byteStride", stride);
@@ -294,7 +291,7 @@ static json_t *append_accessor(vshi_lit_work *work, size_t view, int type, size_
 vsh_result vshi_lit_add_floats(vshi_lit_work *work, const float *values, size_t count, int components,
                                bool bounds, size_t *accessor, vsh_error *error) {
     const size_t stride = (size_t)components * sizeof *values;
-    size_t size, view;
+    size_t size, view = 0;
     if (__builtin_mul_overflow(count, stride, &size)) {
         return vshi_lit_fail_memory(work, error);
     }
@@ -316,7 +313,7 @@ vsh_result vshi_lit_add_indices(vshi_lit_work *work, const uint32_t *indices, si
     /* some interfaces restart strips at 65535 (glTF 2.0, 3.7.2.1) */
     const bool shorts = vertex_count <= UINT16_MAX;
     const size_t offset = work->added.count;
-    size_t size, view;
+    size_t size, view = 0;
     if (__builtin_mul_overflow(count, shorts ? sizeof(uint16_t) : sizeof(uint32_t), &size)) {
         return vshi_lit_fail_memory(work, error);
     }

@@ -276,7 +276,7 @@ static bool has_new_uvs(const vshi_lit_work *work) {
     return false;
 }
 
-static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error) {
+static vsh_result make_document(vshi_lit_work *work, vsh_error *error) {
     const char *path = work->model_path;
     const bool obj = vshi_lit_is_obj(work->output);
     if (path != NULL && vshi_lit_is_same_file(path, work->output)) {
@@ -290,14 +290,12 @@ static vsh_result make_document(vshi_lit_work *work, vshi_lit_uses *uses, vsh_er
     if (has_new_uvs(work)) {
         VSHI_TRY(vshi_lit_read_dracos(work, error));
     }
-    VSHI_TRY(vshi_lit_find_uses(work, uses, error));
     VSHI_TRY(vshi_lit_check_materials(work, error));
     return vshi_lit_make_nodes(work, error);
 }
 
 static vsh_result write_all(vshi_lit_work *work, vsh_error *error) {
     vshi_lit_besides besides = {NULL, 0};
-    vshi_lit_uses uses = {.count = {0}};
     const int32_t place = work->options->image_place;
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
@@ -306,17 +304,16 @@ static vsh_result write_all(vshi_lit_work *work, vsh_error *error) {
                                    work->output, error));
     VSHI_TRY_DONE(
         vshi_allocate((void **)&work->pages, work->page_count, sizeof *work->pages, "pages", error));
-    VSHI_TRY_DONE(make_document(work, &uses, error));
+    VSHI_TRY_DONE(make_document(work, error));
     VSHI_TRY_DONE(vshi_lit_add_images(work, embed, &besides, error));
     if (!vshi_lit_is_obj(work->output)) {
         VSHI_TRY_DONE(vshi_lit_apply_materials(work, error));
-        VSHI_TRY_DONE(vshi_lit_prune(work, &uses, error));
+        VSHI_TRY_DONE(vshi_lit_prune(work, error));
         VSHI_TRY_DONE(vshi_lit_bring_images(work, error)); /* fewer, once pruned */
         VSHI_TRY_DONE(add_origin(work, error));
     }
     result = work->refused ? vshi_lit_fail_memory(work, error) : vshi_lit_write_files(work, &besides, error);
 done:
-    vshi_lit_uses_free(&uses);
     vshi_lit_besides_free(&besides);
     return result;
 }

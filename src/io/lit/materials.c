@@ -223,10 +223,10 @@ vsh_result vshi_lit_bring_images(vshi_lit_work *work, vsh_error *error) {
     free(from);
     free(to);
     const json_t *images = json_object_get(work->gltf.root, "images");
-    json_array_foreach(moves ? work->own_images : NULL, i, image) {
+    const size_t own = json_array_size(images) - work->options->image_count; /* those of the bake follow */
+    json_array_foreach(moves ? images : NULL, i, image) {
         const char *uri = json_string_value(json_object_get(image, "uri"));
-        const bool stays = json_array_get(images, i) == image;
-        if (stays && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
+        if (i < own && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {
             VSHI_TRY(bring_image(work, image, uri, error));
         }
     }

@@ -1,25 +1,20 @@
-/* Removes textures, accessors, buffer views and bytes that nothing refers to any more. New items of a list
- * move to the places of removed ones, so other items keep their numbers. */
+/* Removes accessors and buffer views that nothing refers to, and textures of earlier bakes with their images
+ * and samplers, and numbers the other items anew. */
 #include "io/lit/work.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-/* Lists of the root, by numbers of vshi_lit_uses. */
-enum { ACCESSORS, VIEWS, TEXTURES, IMAGES, SAMPLERS };
+enum { ACCESSORS, VIEWS, TEXTURES, IMAGES, SAMPLERS, KINDS };
 
-static const char *const lists[VSHI_LIT_KINDS] = {"accessors", "bufferViews", "textures", "images",
-                                                  "samplers"};
+static const char *const lists[KINDS] = {"accessors", "bufferViews", "textures", "images", "samplers"};
 
-static size_t count_items(const vshi_lit_work *work, int kind) {
-    return json_array_size(json_object_get(work->gltf.root, lists[kind]));
-}
-
-/* A member of a member of an object; NULL in place of a name: the object itself. */
-static json_t *find_member(json_t *object, const char *first, const char *second) {
-    object = first != NULL ? json_object_get(object, first) : object;
-    return second != NULL ? json_object_get(object, second) : object;
-}
+typedef struct pruning {
+    vshi_lit_work *work;
+    size_t count[KINDS];
+    bool *kept[KINDS];     /* [count] */
+    size_t *number[KINDS]; /* [count]: the new numbers, once they are known; NULL before */
+} pruning;
 
 static const char texture_key[] = "vdbshade_texture";
 
@@ -29,149 +24,109 @@ json_t *vshi_lit_mark_texture(const char *purpose) {
 
 /* --- references */
 
-/* Called for every item of a list that `object` refers to by `key`. */
-typedef void refer_fn(vshi_lit_work *work, json_t *object, const char *key, int kind, void *user);
+static json_t *find_extension(const json_t *object, const char *name) {
+    return json_object_get(json_object_get(object, "extensions"), name);
+}
 
-static void walk_accessors(vshi_lit_work *work, json_t *object, refer_fn *refer, void *user) {
+/* Keeps the item of a list that `object` refers to by `key` or, once there are new numbers, sets its number.
+ */
+static void refer(pruning *p, json_t *object, const char *key, int kind) {
+    size_t index;
+    if (!vshi_gltf_count(object, key, SIZE_MAX, &index) || index >= p->count[kind]) {
+        return;
+    }
+    if (p->number[kind] == NULL) {
+        p->kept[kind][index] = true;
+    } else if (p->number[kind][index] != index) {
+        vshi_lit_set_number(p->work, object, key, p->number[kind][index]);
+    }
+}
+
+static void refer_accessors(pruning *p, json_t *object) {
     const char *name;
     json_t *value;
     json_object_foreach(object, name, value) {
-        refer(work, object, name, ACCESSORS, user);
+        refer(p, object, name, ACCESSORS);
     }
 }
 
-static void walk_meshes(vshi_lit_work *work, refer_fn *refer, void *user) {
-    size_t m, p, t;
-    json_t *mesh, *primitive, *target;
-    json_array_foreach(json_object_get(work->gltf.root, "meshes"), m, mesh) {
-        json_array_foreach(json_object_get(mesh, "primitives"), p, primitive) {
-            walk_accessors(work, json_object_get(primitive, "attributes"), refer, user);
-            refer(work, primitive, "indices", ACCESSORS, user);
-            refer(work, find_member(primitive, "extensions", "KHR_draco_mesh_compression"), "bufferView",
-                  VIEWS, user);
-            json_array_foreach(json_object_get(primitive, "targets"), t, target) {
-                walk_accessors(work, target, refer, user);
-            }
-        }
-    }
-}
-
-/* References of the items of root lists: `key` of a member of a member (NULL: of the item itself). Textures
- * are listed only where a bake sets them: extensions may hold other numbers. */
-static const struct {
-    const char *list, *first, *second, *key;
-    int kind;
-} references[] = {{"skins", NULL, NULL, "inverseBindMatrices", ACCESSORS},
-                  {"accessors", NULL, NULL, "bufferView", VIEWS},
-                  {"accessors", "sparse", "indices", "bufferView", VIEWS},
-                  {"accessors", "sparse", "values", "bufferView", VIEWS},
-                  {"images", NULL, NULL, "bufferView", VIEWS},
-                  {"textures", NULL, NULL, "source", IMAGES},
-                  {"textures", NULL, NULL, "sampler", SAMPLERS},
-                  {"materials", "occlusionTexture", NULL, "index", TEXTURES},
-                  {"materials", "extensions", "MOZ_lightmap", "index", TEXTURES},
-                  {"materials", "pbrMetallicRoughness", "baseColorTexture", "index", TEXTURES}};
-
-static void walk(vshi_lit_work *work, refer_fn *refer, void *user) {
-    size_t i, k;
-    json_t *item, *sampler, *root = work->gltf.root;
-    walk_meshes(work, refer, user);
-    json_array_foreach(json_object_get(root, "nodes"), i, item) {
-        json_t *instancing = find_member(item, "extensions", "EXT_mesh_gpu_instancing");
-        walk_accessors(work, json_object_get(instancing, "attributes"), refer, user);
-    }
-    json_array_foreach(json_object_get(root, "animations"), i, item) {
-        json_array_foreach(json_object_get(item, "samplers"), k, sampler) {
-            refer(work, sampler, "input", ACCESSORS, user);
-            refer(work, sampler, "output", ACCESSORS, user);
-        }
-    }
-    for (size_t r = 0; r < sizeof references / sizeof references[0]; ++r) {
-        json_array_foreach(json_object_get(root, references[r].list), i, item) {
-            refer(work, find_member(item, references[r].first, references[r].second), references[r].key,
-                  references[r].kind, user);
-        }
-    }
-}
-
-/* --- items in use */
-
-static void mark_used(const vshi_lit_uses *uses, const json_t *object, const char *key, int kind) {
-    size_t index;
-    if (vshi_gltf_count(object, key, SIZE_MAX, &index) && index < uses->count[kind]) {
-        uses->used[kind][index] = true;
-    }
-}
-
-static void mark_array(vshi_lit_work *work, json_t *object, const char *key, int kind, void *user) {
-    (void)work;
-    if (kind == ACCESSORS || kind == VIEWS) {
-        mark_used(user, object, key, kind);
-    }
-}
-
-/* Marks textures in a part of a material: every object with an index, also in extensions. */
-static void mark_textures(const vshi_lit_uses *uses, json_t *value) {
+/* Every object in a material with an index is a texture, also in extensions. */
+static void refer_textures(pruning *p, json_t *value) {
     size_t i;
     const char *name;
     json_t *inner;
-    mark_used(uses, value, "index", TEXTURES);
+    refer(p, value, "index", TEXTURES);
     json_array_foreach(value, i, inner) {
-        mark_textures(uses, inner);
+        refer_textures(p, inner);
     }
     json_object_foreach(value, name, inner) {
-        mark_textures(uses, inner);
+        refer_textures(p, inner);
     }
 }
 
-/* Marks samplers and images of textures that stay, also those of other formats (KHR_texture_basisu). */
-static void mark_parts(const vshi_lit_uses *uses, const vshi_lit_work *work, const bool *gone,
-                       size_t gone_count) {
+static void refer_primitive(pruning *p, json_t *primitive) {
+    size_t i;
+    json_t *target;
+    refer_accessors(p, json_object_get(primitive, "attributes"));
+    refer(p, primitive, "indices", ACCESSORS);
+    refer(p, find_extension(primitive, "KHR_draco_mesh_compression"), "bufferView", VIEWS);
+    json_array_foreach(json_object_get(primitive, "targets"), i, target) {
+        refer_accessors(p, target);
+    }
+}
+
+/* References of what always stays. */
+static void refer_roots(pruning *p) {
+    size_t i, k;
+    json_t *item, *inner, *root = p->work->gltf.root;
+    json_array_foreach(json_object_get(root, "meshes"), i, item) {
+        json_array_foreach(json_object_get(item, "primitives"), k, inner) {
+            refer_primitive(p, inner);
+        }
+    }
+    json_array_foreach(json_object_get(root, "nodes"), i, item) {
+        refer_accessors(p, json_object_get(find_extension(item, "EXT_mesh_gpu_instancing"), "attributes"));
+    }
+    json_array_foreach(json_object_get(root, "skins"), i, item) {
+        refer(p, item, "inverseBindMatrices", ACCESSORS);
+    }
+    json_array_foreach(json_object_get(root, "animations"), i, item) {
+        json_array_foreach(json_object_get(item, "samplers"), k, inner) {
+            refer(p, inner, "input", ACCESSORS);
+            refer(p, inner, "output", ACCESSORS);
+        }
+    }
+    refer_textures(p, json_object_get(root, "materials"));
+}
+
+/* References of the kept items of a list. A texture may have images of other formats (KHR_texture_basisu). */
+static void refer_items(pruning *p, int kind) {
     size_t i;
     const char *name;
-    json_t *texture, *extension;
-    json_array_foreach(json_object_get(work->gltf.root, "textures"), i, texture) {
-        if (i < gone_count && gone[i]) {
+    json_t *item, *sparse, *extension;
+    json_array_foreach(json_object_get(p->work->gltf.root, lists[kind]), i, item) {
+        if (p->number[kind] == NULL && !p->kept[kind][i]) {
             continue;
         }
-        mark_used(uses, texture, "sampler", SAMPLERS);
-        mark_used(uses, texture, "source", IMAGES);
-        json_object_foreach(json_object_get(texture, "extensions"), name, extension) {
-            mark_used(uses, extension, "source", IMAGES);
+        if (kind == TEXTURES) {
+            refer(p, item, "sampler", SAMPLERS);
+            refer(p, item, "source", IMAGES);
+            json_object_foreach(json_object_get(item, "extensions"), name, extension) {
+                refer(p, extension, "source", IMAGES);
+            }
+        } else {
+            sparse = json_object_get(item, "sparse");
+            refer(p, item, "bufferView", VIEWS);
+            refer(p, json_object_get(sparse, "indices"), "bufferView", VIEWS);
+            refer(p, json_object_get(sparse, "values"), "bufferView", VIEWS);
         }
     }
-}
-
-/* Finds the used accessors, views and textures. */
-static vsh_result find_arrays(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error) {
-    *uses = (vshi_lit_uses){.count = {0}};
-    for (int kind = 0; kind < VSHI_LIT_KINDS; ++kind) {
-        const size_t count = count_items(work, kind);
-        VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&uses->used[kind], count, sizeof(bool), error));
-        uses->count[kind] = count;
-    }
-    walk(work, mark_array, uses);
-    mark_textures(uses, json_object_get(work->gltf.root, "materials"));
-    return VSH_OK;
-}
-
-vsh_result vshi_lit_find_uses(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error) {
-    VSHI_TRY(find_arrays(work, uses, error));
-    mark_parts(uses, work, NULL, 0);
-    return VSH_OK;
-}
-
-void vshi_lit_uses_free(vshi_lit_uses *uses) {
-    for (int kind = 0; kind < VSHI_LIT_KINDS; ++kind) {
-        free(uses->used[kind]);
-    }
-    *uses = (vshi_lit_uses){.count = {0}};
 }
 
 /* --- extensions */
 
-/* Whether walk() and mark_textures() find all references of an extension. "_" at the end: all names that
- * begin so. */
+/* Whether the functions above find all references of an extension. "_" at the end: all names that begin so.
+ */
 static bool is_known(const char *name) {
     static const char *const known[] = {"KHR_draco_mesh_compression",
                                         "EXT_mesh_gpu_instancing",
@@ -213,187 +168,77 @@ static bool knows_all(json_t *value) {
     return known;
 }
 
-/* --- bytes */
+/* --- items */
 
-/* Where a range of a buffer begins (1) or ends (-1), whose view stays (kept) or is replaced (gone). */
-typedef struct edge {
-    size_t buffer, at;
-    int kept, gone;
-} edge;
-
-static int compare_edges(const void *a, const void *b) {
-    const edge *one = a, *other = b;
-    return one->buffer != other->buffer ? (one->buffer < other->buffer ? -1 : 1)
-                                        : (one->at > other->at) - (one->at < other->at);
-}
-
-/* Adds the edges of a view. Multiples of 8 bytes are dropped, so that later bytes stay aligned. */
-static void add_edges(const vshi_lit_work *work, const json_t *view, bool kept, edge *edges, size_t *count) {
-    enum { ALIGNMENT = 8 };
-    static const size_t most = SIZE_MAX / 4; /* more than any buffer has */
-    size_t buffer, offset, length;
-    if (!vshi_gltf_count(view, "buffer", SIZE_MAX, &buffer) || buffer >= work->gltf.buffer_count ||
-        !vshi_gltf_count(view, "byteOffset", 0, &offset) || offset > most ||
-        !vshi_gltf_count(view, "byteLength", 0, &length)) {
-        return;
+/* Keeps the file's own textures, those of this bake, which are the last, and others that a material shows.
+ * With a texture go its images and samplers, unless a kept one has them, too. */
+static void keep_textures(pruning *p) {
+    const size_t own = p->count[TEXTURES] - p->work->options->image_count;
+    size_t i;
+    json_t *texture;
+    bool *shown = p->kept[TEXTURES];
+    json_array_foreach(json_object_get(p->work->gltf.root, lists[TEXTURES]), i, texture) {
+        const bool marked = json_object_get(json_object_get(texture, "extras"), texture_key) != NULL;
+        shown[i] = !(shown[i] || i >= own || !marked);
     }
-    const size_t end = offset + (length < most ? length : most);
-    const size_t from = (offset + (kept ? 0 : ALIGNMENT - 1)) / ALIGNMENT * ALIGNMENT;
-    edges[(*count)++] = (edge){buffer, from, kept, !kept};
-    edges[(*count)++] = (edge){buffer, (end + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT, -kept, -!kept};
-}
-
-/* Lists the bytes of replaced views that no other view has. */
-static vsh_result drop_bytes(vshi_lit_work *work, vsh_error *error) {
-    static const char *const compressions[] = {"EXT_meshopt_compression", "KHR_meshopt_compression"};
-    const size_t most = 6 * work->first_view; /* a view has edges of its own and of each compression */
-    edge *edges;
-    size_t count = 0, i;
-    int kept = 0, gone = 0;
-    json_t *view;
-    VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&work->dropped.list, most, sizeof *work->dropped.list,
-                                error));
-    VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&edges, most, sizeof *edges, error));
-    json_array_foreach(json_object_get(work->gltf.root, "bufferViews"), i, view) {
-        if (i < work->first_view) {
-            add_edges(work, view, !work->replaced[i], edges, &count);
-            for (size_t k = 0; k < sizeof compressions / sizeof compressions[0]; ++k) {
-                const json_t *compressed = find_member(view, "extensions", compressions[k]);
-                if (compressed != NULL) {
-                    add_edges(work, compressed, !work->replaced[i], edges, &count);
-                }
-            }
+    refer_items(p, TEXTURES); /* of those that go */
+    for (int kind = TEXTURES; kind < KINDS; ++kind) {
+        for (i = 0; i < p->count[kind]; ++i) {
+            p->kept[kind][i] = !p->kept[kind][i];
         }
     }
-    if (count > 0) {
-        qsort(edges, count, sizeof *edges, compare_edges);
-    }
-    for (i = 0; i < count; ++i) {
-        if (gone > 0 && kept == 0 && edges[i].at > edges[i - 1].at) {
-            work->dropped.list[work->dropped.count++] =
-                (vshi_lit_range){edges[i].buffer, edges[i - 1].at, edges[i].at};
+    refer_items(p, TEXTURES);
+}
+
+/* Removes the items of a list that are not kept, and finds the numbers of the others. */
+static vsh_result remove_items(pruning *p, int kind, vsh_error *error) {
+    json_t *root = p->work->gltf.root, *list = json_object_get(root, lists[kind]);
+    size_t left = 0;
+    VSHI_TRY(vshi_gltf_allocate(&p->work->gltf, (void **)&p->number[kind], p->count[kind],
+                                sizeof *p->number[kind], error));
+    for (size_t i = 0; i < p->count[kind]; ++i) {
+        p->number[kind][i] = left;
+        if (p->kept[kind][i]) {
+            p->work->refused |= left != i && json_array_set(list, left, json_array_get(list, i)) != 0;
+            ++left;
         }
-        kept += edges[i].kept;
-        gone += edges[i].gone;
     }
-    free(edges);
+    while (json_array_size(list) > left) {
+        json_array_remove(list, json_array_size(list) - 1);
+    }
+    if (left == 0) { /* glTF has no empty lists */
+        json_object_del(root, lists[kind]);
+    }
     return VSH_OK;
 }
 
-/* --- places */
-
-/* The places of the new items of a list, first … count - 1. */
-typedef struct placing {
-    int kind;
-    size_t *moved; /* [count - first] */
-    size_t first, count;
-} placing;
-
-static void rename_item(vshi_lit_work *work, json_t *object, const char *key, int kind, void *user) {
-    const placing *places = user;
-    size_t index;
-    if (kind == places->kind && vshi_gltf_count(object, key, SIZE_MAX, &index) && index >= places->first &&
-        index < places->count) {
-        vshi_lit_set_number(work, object, key, places->moved[index - places->first]);
+static vsh_result prune(pruning *p, vsh_error *error) {
+    for (int kind = 0; kind < KINDS; ++kind) {
+        p->count[kind] = json_array_size(json_object_get(p->work->gltf.root, lists[kind]));
+        VSHI_TRY(
+            vshi_gltf_allocate(&p->work->gltf, (void **)&p->kept[kind], p->count[kind], sizeof(bool), error));
     }
+    refer_roots(p);
+    keep_textures(p);
+    refer_items(p, ACCESSORS);
+    refer_items(p, IMAGES);
+    for (int kind = 0; kind < KINDS; ++kind) {
+        VSHI_TRY(remove_items(p, kind, error));
+    }
+    refer_roots(p);
+    refer_items(p, TEXTURES);
+    refer_items(p, ACCESSORS);
+    refer_items(p, IMAGES);
+    return VSH_OK;
 }
 
-/* Finds places for the new items: those of removed items in order, then places behind the old items. Removed
- * items at the end are cut off. Returns how many items are left. */
-static size_t find_places(const placing *places, const bool *gone) {
-    const size_t first = places->first, more = places->count - first;
-    size_t done = 0, behind = 0; /* behind: the first place behind the taken ones */
-    for (size_t i = 0; i < first && done < more; ++i) {
-        if (gone[i]) {
-            places->moved[done++] = i;
-            behind = i + 1;
-        }
+vsh_result vshi_lit_prune(vshi_lit_work *work, vsh_error *error) {
+    pruning p = {.work = work};
+    work->pruned = knows_all(work->gltf.root);
+    const vsh_result result = work->pruned ? prune(&p, error) : VSH_OK;
+    for (int kind = 0; kind < KINDS; ++kind) {
+        free(p.number[kind]);
+        free(p.kept[kind]);
     }
-    size_t end = first + more - done;
-    for (size_t i = first; done < more; ++i) {
-        places->moved[done++] = i;
-    }
-    while (end <= first && end > behind && gone[end - 1]) {
-        --end;
-    }
-    return end;
-}
-
-/* Marks views whose places are taken or cut off, and drops their bytes. */
-static vsh_result replace_views(vshi_lit_work *work, const placing *places, size_t end, vsh_error *error) {
-    VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&work->replaced, places->first, sizeof(bool), error));
-    for (size_t i = 0; i < places->count - places->first && places->moved[i] < places->first; ++i) {
-        work->replaced[places->moved[i]] = true;
-    }
-    for (size_t i = end; i < places->first; ++i) {
-        work->replaced[i] = true;
-    }
-    return drop_bytes(work, error);
-}
-
-/* Moves the new items of a list to the places of the removed ones, which `before` has. */
-static vsh_result move_items(vshi_lit_work *work, const vshi_lit_uses *before, int kind, vsh_error *error) {
-    json_t *list = json_object_get(work->gltf.root, lists[kind]);
-    placing places = {.kind = kind, .first = before->count[kind], .count = json_array_size(list)};
-    vsh_result result = VSH_OK;
-    VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&places.moved, places.count - places.first,
-                                sizeof *places.moved, error));
-    const size_t end = find_places(&places, before->used[kind]);
-    if (kind == VIEWS) { /* before items move */
-        VSHI_TRY_DONE(replace_views(work, &places, end, error));
-    }
-    walk(work, rename_item, &places);
-    for (size_t i = places.first; i < places.count; ++i) {
-        const size_t to = places.moved[i - places.first]; /* at most i */
-        work->refused |= to != i && json_array_set(list, to, json_array_get(list, i)) != 0;
-    }
-    while (json_array_size(list) > end) {
-        json_array_remove(list, json_array_size(list) - 1);
-    }
-    if (end == 0 && places.count > 0) { /* glTF has no empty lists */
-        json_object_del(work->gltf.root, lists[kind]);
-    }
-done:
-    free(places.moved);
-    return result;
-}
-
-/* Leaves those items in `before` that are not used any more. */
-static void keep_unused(const vshi_lit_uses *before, const vshi_lit_uses *after, int kind) {
-    for (size_t i = 0; i < before->count[kind]; ++i) {
-        before->used[kind][i] = before->used[kind][i] && !after->used[kind][i];
-    }
-}
-
-vsh_result vshi_lit_prune(vshi_lit_work *work, vshi_lit_uses *before, vsh_error *error) {
-    vshi_lit_uses after = {.count = {0}};
-    size_t i;
-    const json_t *texture;
-    vsh_result result;
-    if (!knows_all(work->gltf.root)) {
-        return VSH_OK;
-    }
-    VSHI_TRY_DONE(find_arrays(work, &after, error));
-    keep_unused(before, &after, ACCESSORS);
-    keep_unused(before, &after, TEXTURES);
-    json_array_foreach(json_object_get(work->gltf.root, "textures"), i, texture) {
-        if (i < before->count[TEXTURES] &&
-            json_object_get(json_object_get(texture, "extras"), texture_key) == NULL) {
-            before->used[TEXTURES][i] = false; /* the file's own textures stay */
-        }
-    }
-    mark_parts(&after, work, before->used[TEXTURES], before->count[TEXTURES]);
-    keep_unused(before, &after, IMAGES);
-    keep_unused(before, &after, SAMPLERS);
-    VSHI_TRY_DONE(move_items(work, before, TEXTURES, error));
-    VSHI_TRY_DONE(move_items(work, before, IMAGES, error));
-    VSHI_TRY_DONE(move_items(work, before, SAMPLERS, error));
-    VSHI_TRY_DONE(move_items(work, before, ACCESSORS, error));
-    vshi_lit_uses_free(&after); /* fewer accessors use fewer views */
-    VSHI_TRY_DONE(find_arrays(work, &after, error));
-    keep_unused(before, &after, VIEWS);
-    result = move_items(work, before, VIEWS, error);
-done:
-    vshi_lit_uses_free(&after);
     return result;
 }

@@ -73,11 +73,6 @@ typedef struct vshi_lit_page_images {
     double intensity;                  /* of the lightmap */
 } vshi_lit_page_images;
 
-/* Bytes begin … end - 1 of a buffer. */
-typedef struct vshi_lit_range {
-    size_t buffer, begin, end;
-} vshi_lit_range;
-
 typedef struct vshi_lit_work {
     const vsh_model *model;
     const char *model_path;     /* NULL: none */
@@ -88,19 +83,14 @@ typedef struct vshi_lit_work {
     size_t page_count;           /* 1 + the highest page */
     vshi_gltf gltf;              /* arrays of its root only grow until it is written */
     char *text;         /* of the file, with the binary chunk; NULL: the document is made of the model */
-    size_t first_view;  /* buffer views from this one on lie in `added` */
-    bool *replaced;     /* [first_view]: earlier views that lie there, too; NULL: none */
     json_t *own_images; /* the file's own, in their places; NULL: none */
+    bool pruned;        /* bytes that no buffer view has may go */
     bool refused;       /* memory for the JSON was refused: the document must not be written */
     vshi_lit_dracos dracos;
     struct {
         unsigned char *list;
         size_t count, room;
-    } added; /* bytes behind the buffers */
-    struct {
-        vshi_lit_range *list;
-        size_t count;
-    } dropped; /* sorted: bytes of the buffers that nothing refers to any more */
+    } added; /* new bytes, which are buffer gltf.buffer_count until all buffers become one */
     struct {
         vshi_lit_look *list;
         size_t count, room;
@@ -320,22 +310,10 @@ vsh_result vshi_lit_make_pages(vshi_lit_work *work, const json_t *made, const vs
  * material shows it. The file's own textures stay. NULL without memory. */
 json_t *vshi_lit_mark_texture(const char *purpose);
 
-/* Which accessors, buffer views, textures, images and samplers something refers to. */
-enum { VSHI_LIT_KINDS = 5 };
-typedef struct vshi_lit_uses {
-    bool *used[VSHI_LIT_KINDS]; /* [count] each */
-    size_t count[VSHI_LIT_KINDS];
-} vshi_lit_uses;
-
-/* Free after a failure too. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_find_uses(vshi_lit_work *work, vshi_lit_uses *uses, vsh_error *error);
-void vshi_lit_uses_free(vshi_lit_uses *uses);
-
-/* Moves new accessors, buffer views, textures, images and samplers to the places of unused ones, and cuts
- * unused ones off the end of a list. Other items keep their numbers. Lists the bytes that only unused ones
- * had (work->dropped). Removes textures of earlier bakes only. Does nothing if an unknown extension may refer
- * to items. `before` is used up. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_prune(vshi_lit_work *work, vshi_lit_uses *before, vsh_error *error);
+/* Removes accessors, buffer views, and marked textures that nothing refers to, and numbers the other items
+ * anew. The last textures and images, one for each image of the options, stay. Does nothing if an unknown
+ * extension may refer to items, else sets work->pruned. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
+vsh_result vshi_lit_prune(vshi_lit_work *work, vsh_error *error);
 
 /* --- files (write.c) */
 

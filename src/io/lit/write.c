@@ -12,6 +12,12 @@
 #include <strings.h>
 #include <sys/stat.h>
 
+/* Bytes begin … end - 1 of a buffer, or of the added bytes, and their offset in the buffer that is written.
+ */
+typedef struct range {
+    size_t buffer, begin, end, place;
+} range;
+
 typedef struct writing {
     vshi_lit_work *work;
     const vshi_lit_besides *besides;
@@ -20,11 +26,11 @@ typedef struct writing {
     vshi_output **outputs;  /* [file_count]: of the files */
     char **paths;           /* [file_count] */
     size_t file_count;
-    size_t *offsets; /* [buffer_count]: of each in the buffer that is written; SIZE_MAX: it has no bytes
-                        (EXT_meshopt_compression's fallback). One block with numbers */
-    size_t *numbers; /* [buffer_count]: of each in the new list */
-    size_t added;    /* offset of the added bytes */
-    size_t size;     /* of the buffer */
+    json_t **parts; /* [part_count]: buffer views, and extensions of them with a buffer of their own */
+    size_t part_count;
+    range *ranges; /* [range_count]: bytes of the buffer that is written */
+    size_t range_count;
+    size_t size; /* of that buffer */
 } writing;
 
 /* --- a file as a stream */
@@ -248,137 +254,171 @@ static void write_value(writer *w, const json_t *value) {
     }
 }
 
-/* --- the buffers become one */
+/* --- the buffers become one, of the bytes that buffer views have */
 
-static bool has_bytes(const vshi_lit_work *work, size_t index) {
-    const bool chunk = index == 0 && work->gltf.binary;
-    return chunk || json_object_get(vshi_gltf_element(&work->gltf, "buffers", index), "uri") != NULL;
+enum { ALIGNMENT = 8 }; /* of ranges, so that the alignment of accessors in them stays */
+
+static bool has_bytes(const vshi_lit_work *work, size_t buffer) {
+    return buffer == work->gltf.buffer_count || (buffer == 0 && work->gltf.binary) ||
+           json_object_get(vshi_gltf_element(&work->gltf, "buffers", buffer), "uri") != NULL;
 }
 
-/* Counts the dropped bytes of a buffer in front of `offset`. */
-static size_t count_dropped(const vshi_lit_work *work, size_t buffer, size_t offset) {
-    size_t sum = 0;
-    for (size_t i = 0; i < work->dropped.count; ++i) {
-        const vshi_lit_range *range = &work->dropped.list[i];
-        const size_t end = range->end < offset ? range->end : offset;
-        sum += range->buffer == buffer && end > range->begin ? end - range->begin : 0;
-    }
-    return sum;
+static vshi_gltf_bytes bytes_of(const vshi_lit_work *work, size_t buffer) {
+    return buffer < work->gltf.buffer_count ? work->gltf.buffers[buffer].bytes
+                                            : (vshi_gltf_bytes){work->added.list, work->added.count};
 }
 
-/* Reads the buffers that have not been read, and finds their places. Errors: as vsh_model_read(). */
-static vsh_result place_buffers(writing *w, vsh_error *error) {
-    enum { ALIGNMENT = 8 };
+static vsh_result list_parts(writing *w, vsh_error *error) {
     vshi_gltf *gltf = &w->work->gltf;
-    const vshi_array arrays[] = {VSHI_ARRAY(w->offsets, gltf->buffer_count),
-                                 VSHI_ARRAY(w->numbers, gltf->buffer_count)};
-    VSHI_TRY(VSHI_LIT_ALLOCATE(w->work, arrays, error));
-    for (size_t i = 0; i < gltf->buffer_count; ++i) {
-        w->offsets[i] = SIZE_MAX;
-        if (has_bytes(w->work, i)) {
-            VSHI_TRY(vshi_gltf_load(gltf, i, error));
-            w->offsets[i] = w->size;
-            const size_t size = gltf->buffers[i].bytes.size;
-            w->size += (size - count_dropped(w->work, i, size) + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
-        }
+    const json_t *views = json_object_get(gltf->root, "bufferViews");
+    size_t most = 0, i;
+    const char *name;
+    json_t *view, *extension;
+    json_array_foreach(views, i, view) {
+        most += 1 + json_object_size(json_object_get(view, "extensions"));
     }
-    w->added = w->size;
-    w->size += w->work->added.count;
-    return VSH_OK;
-}
-
-static bool lies_in_added(const vshi_lit_work *work, size_t view) {
-    return view >= work->first_view || (work->replaced != NULL && work->replaced[view]);
-}
-
-/* Whether a view still refers to a buffer without bytes, or nothing has been dropped. */
-static bool is_needed(const vshi_lit_work *work, size_t buffer) {
-    size_t i, of;
-    const json_t *view;
-    json_array_foreach(json_object_get(work->gltf.root, "bufferViews"), i, view) {
-        if (!lies_in_added(work, i) && vshi_gltf_count(view, "buffer", SIZE_MAX, &of) && of == buffer) {
-            return true;
-        }
-    }
-    return work->dropped.count == 0;
-}
-
-/* Makes the new list: one buffer of all bytes, which is the first that had any, then those without. Returns
- * the one buffer; NULL: there are no bytes. */
-static json_t *list_buffers(writing *w) {
-    vshi_lit_work *work = w->work;
-    vshi_gltf *gltf = &work->gltf;
-    json_t *list = json_array(), *old = json_object_get(gltf->root, "buffers"), *one = NULL;
-    for (size_t i = 0; i < gltf->buffer_count && one == NULL; ++i) {
-        one = w->offsets[i] != SIZE_MAX ? json_incref(json_array_get(old, i)) : NULL;
-    }
-    if (one != NULL || w->size > 0) {
-        one = one != NULL ? one : json_object();
-        vshi_lit_push(work, list, one);
-    }
-    for (size_t i = 0; i < gltf->buffer_count; ++i) {
-        w->numbers[i] = w->offsets[i] != SIZE_MAX ? 0 : json_array_size(list);
-        if (w->offsets[i] == SIZE_MAX && is_needed(work, i)) {
-            vshi_lit_push(work, list, json_incref(json_array_get(old, i)));
-        }
-    }
-    if (json_array_size(list) > 0) {
-        vshi_lit_set(work, gltf->root, "buffers", list);
-    } else {
-        json_object_del(gltf->root, "buffers");
-        json_decref(list);
-    }
-    return one;
-}
-
-/* Moves the reference of a view, or of an extension of it with a buffer of its own. */
-static vsh_result move_view(const writing *w, json_t *view, vsh_error *error) {
-    const vshi_gltf *gltf = &w->work->gltf;
-    size_t buffer, offset;
-    if (!vshi_gltf_count(view, "buffer", SIZE_MAX, &buffer) || buffer >= gltf->buffer_count ||
-        !vshi_gltf_count(view, "byteOffset", 0, &offset)) {
-        return vshi_gltf_fail(gltf, error, "a buffer view refers to no buffer");
-    }
-    vshi_lit_set_number(w->work, view, "buffer", w->numbers[buffer]);
-    const size_t base = w->offsets[buffer] != SIZE_MAX ? w->offsets[buffer] : 0;
-    const size_t moved = base + offset - count_dropped(w->work, buffer, offset);
-    if (moved != offset) {
-        vshi_lit_set_number(w->work, view, "byteOffset", moved);
-    }
-    return VSH_OK;
-}
-
-static vsh_result move_views(const writing *w, vsh_error *error) {
-    size_t i;
-    json_t *view;
-    json_array_foreach(json_object_get(w->work->gltf.root, "bufferViews"), i, view) {
-        if (lies_in_added(w->work, i)) {
-            const size_t at = (size_t)json_integer_value(json_object_get(view, "byteOffset"));
-            vshi_lit_set_number(w->work, view, "buffer", 0);
-            vshi_lit_set_number(w->work, view, "byteOffset", at + w->added);
-            continue;
-        }
-        VSHI_TRY(move_view(w, view, error));
-        const char *name;
-        json_t *extension;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&w->parts, most, sizeof(json_t *), error));
+    json_array_foreach(views, i, view) {
+        w->parts[w->part_count++] = view;
         json_object_foreach(json_object_get(view, "extensions"), name, extension) {
             if (json_object_get(extension, "buffer") != NULL) {
-                VSHI_TRY(move_view(w, extension, error));
+                w->parts[w->part_count++] = extension;
             }
         }
     }
     return VSH_OK;
 }
 
-/* Makes the buffers one, in the file w->bin or (NULL) in the document. */
+/* Adds bytes of a buffer, as far as it has them. */
+static void add_range(writing *w, size_t buffer, size_t offset, size_t length) {
+    const size_t size = bytes_of(w->work, buffer).size;
+    offset = offset < size ? offset : size;
+    length = length < size - offset ? length : size - offset;
+    const size_t end = (offset + length + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    w->ranges[w->range_count++] = (range){buffer, offset / ALIGNMENT * ALIGNMENT, end < size ? end : size, 0};
+}
+
+static int compare_ranges(const void *a, const void *b) {
+    const range *x = a, *y = b;
+    return x->buffer != y->buffer ? (x->buffer < y->buffer ? -1 : 1)
+                                  : (x->begin > y->begin) - (x->begin < y->begin);
+}
+
+/* Joins ranges that touch, and finds their places. */
+static void place_ranges(writing *w) {
+    size_t count = 0;
+    if (w->range_count > 1) {
+        qsort(w->ranges, w->range_count, sizeof *w->ranges, compare_ranges);
+    }
+    for (size_t i = 0; i < w->range_count; ++i) {
+        const range next = w->ranges[i];
+        range *last = count > 0 ? &w->ranges[count - 1] : NULL;
+        if (last != NULL && last->buffer == next.buffer && next.begin <= last->end) {
+            last->end = next.end > last->end ? next.end : last->end;
+        } else {
+            w->ranges[count++] = next;
+        }
+    }
+    w->range_count = count;
+    for (size_t i = 0; i < count; ++i) {
+        range *one = &w->ranges[i];
+        one->place = w->size;
+        w->size += (one->end - one->begin + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    }
+}
+
+/* Reads the buffers that have not been read, and finds the places of their bytes. Errors: as
+ * vsh_model_read(). */
+static vsh_result place_buffers(writing *w, vsh_error *error) {
+    vshi_lit_work *work = w->work;
+    vshi_gltf *gltf = &work->gltf;
+    VSHI_TRY(list_parts(w, error));
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&w->ranges, w->part_count + gltf->buffer_count + 1,
+                                sizeof *w->ranges, error));
+    for (size_t b = 0; b < gltf->buffer_count; ++b) {
+        if (has_bytes(work, b)) {
+            VSHI_TRY(vshi_gltf_load(gltf, b, error));
+        }
+    }
+    for (size_t b = 0; b <= gltf->buffer_count && !work->pruned; ++b) {
+        if (has_bytes(work, b)) {
+            add_range(w, b, 0, bytes_of(work, b).size);
+        }
+    }
+    for (size_t i = 0; i < w->part_count; ++i) {
+        size_t buffer, offset, length;
+        if (!vshi_gltf_count(w->parts[i], "buffer", SIZE_MAX, &buffer) || buffer > gltf->buffer_count ||
+            !vshi_gltf_count(w->parts[i], "byteOffset", 0, &offset) ||
+            !vshi_gltf_count(w->parts[i], "byteLength", 0, &length)) {
+            return vshi_gltf_fail(gltf, error, "a buffer view refers to no buffer");
+        }
+        if (has_bytes(work, buffer)) {
+            add_range(w, buffer, offset, length);
+        }
+    }
+    place_ranges(w);
+    return VSH_OK;
+}
+
+/* The range that begins last at or before an offset. */
+static const range *find_range(const writing *w, size_t buffer, size_t offset) {
+    const range wanted = {buffer, offset, 0, 0};
+    size_t low = 0, high = w->range_count;
+    while (low + 1 < high) {
+        const size_t middle = low + (high - low) / 2;
+        if (compare_ranges(&w->ranges[middle], &wanted) <= 0) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    return &w->ranges[low];
+}
+
+/* Sets the buffer and the offset of a view. numbers[buffer]: 1 + the new number of a buffer without bytes,
+ * which is added to `list`; 0: not yet. */
+static void move_part(const writing *w, json_t *part, size_t *numbers, json_t *list) {
+    vshi_lit_work *work = w->work;
+    size_t buffer = 0, offset = 0;
+    vshi_gltf_count(part, "buffer", 0, &buffer);
+    vshi_gltf_count(part, "byteOffset", 0, &offset);
+    if (has_bytes(work, buffer)) {
+        const range *in = find_range(w, buffer, offset);
+        const size_t moved = in->place + (offset - in->begin);
+        vshi_lit_set_number(work, part, "buffer", 0);
+        if (moved != offset) {
+            vshi_lit_set_number(work, part, "byteOffset", moved);
+        }
+        return;
+    }
+    if (numbers[buffer] == 0) {
+        vshi_lit_push(work, list,
+                      json_incref(json_array_get(json_object_get(work->gltf.root, "buffers"), buffer)));
+        numbers[buffer] = json_array_size(list);
+    }
+    vshi_lit_set_number(work, part, "buffer", numbers[buffer] - 1);
+}
+
+/* Makes one buffer of all bytes, in the file w->bin or (NULL) in the document. It is the first that had any.
+ * Buffers without bytes (EXT_meshopt_compression's fallback) stay if views refer to them. */
 static vsh_result join_buffers(writing *w, vsh_error *error) {
     vshi_lit_work *work = w->work;
-    json_t *one = list_buffers(w);
-    VSHI_TRY(move_views(w, error));
-    if (work->dropped.count > 0) { /* perhaps the last compressed views */
-        vshi_lit_drop_extension(work, "EXT_meshopt_compression");
-        vshi_lit_drop_extension(work, "KHR_meshopt_compression");
+    vshi_gltf *gltf = &work->gltf;
+    size_t *numbers;
+    VSHI_TRY(vshi_gltf_allocate(gltf, (void **)&numbers, gltf->buffer_count + 1, sizeof *numbers, error));
+    json_t *list = json_array(), *one = NULL;
+    for (size_t b = 0; b < gltf->buffer_count && one == NULL; ++b) {
+        one = has_bytes(work, b) ? json_incref(json_array_get(json_object_get(gltf->root, "buffers"), b))
+                                 : NULL;
     }
+    one = one == NULL && w->size > 0 ? json_object() : one;
+    if (one != NULL) {
+        vshi_lit_push(work, list, one);
+    }
+    for (size_t i = 0; i < w->part_count; ++i) {
+        move_part(w, w->parts[i], numbers, list);
+    }
+    free(numbers);
     if (one != NULL) {
         vshi_lit_set_number(work, one, "byteLength", w->size);
         json_object_del(one, "uri");
@@ -386,6 +426,14 @@ static vsh_result join_buffers(writing *w, vsh_error *error) {
     if (w->bin != NULL) {
         vshi_lit_set(work, one, "uri", vshi_lit_uri(w->bin));
     }
+    if (json_array_size(list) > 0) {
+        vshi_lit_set(work, gltf->root, "buffers", list);
+    } else {
+        json_object_del(gltf->root, "buffers");
+        json_decref(list);
+    }
+    vshi_lit_drop_extension(work, "EXT_meshopt_compression");
+    vshi_lit_drop_extension(work, "KHR_meshopt_compression");
     return work->refused ? vshi_lit_fail_memory(work, error) : VSH_OK;
 }
 
@@ -403,36 +451,17 @@ static void write_word(FILE *to, uint64_t number) {
     }
 }
 
-/* Writes bytes begin … end - 1. An empty buffer has no bytes to point to. */
-static void write_range(const unsigned char *bytes, size_t begin, size_t end, FILE *to) {
-    if (begin < end) {
-        fwrite(bytes + begin, 1, end - begin, to);
-    }
-}
-
-/* Writes all buffers, without the dropped bytes, and the added bytes. */
-static void write_buffers(const writing *w, FILE *to) {
-    const vshi_lit_work *work = w->work;
+static void write_buffer(const writing *w, FILE *to) {
     size_t written = 0;
-    for (size_t b = 0; b < work->gltf.buffer_count; ++b) {
-        const vshi_gltf_bytes bytes = work->gltf.buffers[b].bytes;
-        size_t at = 0;
-        if (w->offsets[b] == SIZE_MAX) {
-            continue;
+    for (size_t i = 0; i < w->range_count; ++i) {
+        const range *one = &w->ranges[i];
+        write_padding(to, one->place - written, '\0');
+        if (one->begin < one->end) { /* an empty buffer has no bytes to point to */
+            fwrite(bytes_of(w->work, one->buffer).at + one->begin, 1, one->end - one->begin, to);
         }
-        write_padding(to, w->offsets[b] - written, '\0');
-        for (size_t i = 0; i < work->dropped.count; ++i) {
-            const vshi_lit_range *range = &work->dropped.list[i];
-            if (range->buffer == b && range->begin < bytes.size) {
-                write_range(bytes.at, at, range->begin, to);
-                at = range->end < bytes.size ? range->end : bytes.size;
-            }
-        }
-        write_range(bytes.at, at, bytes.size, to);
-        written = w->offsets[b] + bytes.size - count_dropped(work, b, bytes.size);
+        written = one->place + (one->end - one->begin);
     }
-    write_padding(to, w->added - written, '\0');
-    write_range(work->added.list, 0, work->added.count, to);
+    write_padding(to, w->size - written, '\0');
 }
 
 /* Writes a GLB (glTF 2.0, 4.4). */
@@ -457,7 +486,7 @@ static vsh_result write_chunks(const writing *w, const char *json, size_t json_s
     if (bytes > 0) {
         write_word(to, bytes);
         write_word(to, BINARY_CHUNK);
-        write_buffers(w, to);
+        write_buffer(w, to);
         write_padding(to, bytes - w->size, '\0');
     }
     return VSH_OK;
@@ -494,7 +523,8 @@ vsh_result vshi_lit_write_model(const vsh_model *model, const char *path, const 
     VSHI_TRY_DONE(join_buffers(&w, error));
     result = write_document(&w, true, to, error);
 done:
-    free(w.offsets);
+    free(w.ranges);
+    free(w.parts);
     vshi_lit_work_free(&work);
     return result;
 }
@@ -717,7 +747,7 @@ static vsh_result write_content(const writing *w, size_t i, FILE *to, vsh_error 
     } else if (obj) {
         write_mtl(w->work, w->besides, to);
     } else {
-        write_buffers(w, to);
+        write_buffer(w, to);
     }
     return VSH_OK;
 }
@@ -751,6 +781,7 @@ done:
     }
     free(w.files);
     free(w.bin);
-    free(w.offsets);
+    free(w.ranges);
+    free(w.parts);
     return result;
 }
