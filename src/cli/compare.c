@@ -291,8 +291,9 @@ static void print_channel(const vsh_channel_comparison *channel) {
     }
     if (channel->limits.options.noise > 0.0) {
         printf("; noise of %.3g is allowed for", channel->limits.options.noise);
-        printf(isnan(made_to[0]) || isnan(made_to[1]) ? "" : " (made to max errors %.3g and %.3g)",
-               made_to[0], made_to[1]);
+        if (!isnan(made_to[0]) && !isnan(made_to[1])) {
+            printf(" (made to max errors %.3g and %.3g)", made_to[0], made_to[1]);
+        }
     }
     for (int i = VSH_MEASURE_NONFINITE + 1; i < VSH_MEASURE_COUNT && m->count > 0; ++i) {
         if (!isnan(m->value[i])) {
