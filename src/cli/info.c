@@ -4,7 +4,7 @@
 #include <stdarg.h>
 
 #define IMAGE_ENDINGS                                                                                        \
-    "exr png tif tiff jpg jpeg hdr tga bmp webp dpx psd pgm ppm pnm pfm gif jp2 j2k sgi rgb rla ico heic "   \
+    "exr png tif tiff jpg jpeg hdr tga bmp webp psd pgm ppm pnm pfm gif jp2 j2k sgi rgb rla ico heic "   \
     "heif avif"
 
 typedef struct info_settings {

@@ -620,8 +620,8 @@ static vsh_result find_tolerances(files *f, vsh_error *error) {
 static const char *format_of(const char *path) {
     static const struct {
         const char *ending, *format;
-    } other[] = {{"tiff", "tif"}, {"jpeg", "jpg"},  {"jpe", "jpg"},  {"jif", "jpg"}, {"jfif", "jpg"},
-                 {"jfi", "jpg"},  {"heif", "heic"}, {"rgbe", "hdr"}, {"j2k", "jp2"}};
+    } other[] = {{"tiff", "tif"}, {"jpeg", "jpg"}, {"jpe", "jpg"},   {"jif", "jpg"},
+                 {"jfif", "jpg"}, {"jfi", "jpg"},  {"heif", "heic"}, {"rgbe", "hdr"}};
     const char *ending = vshi_path_ending(path);
     for (size_t i = 0; i < sizeof other / sizeof other[0]; ++i) {
         if (strcasecmp(other[i].ending, ending) == 0) {

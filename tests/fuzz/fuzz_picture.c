@@ -4,8 +4,8 @@
 #include <vdbshade/image.h>
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
-    static const char *const names[] = {"a.tif", "a.jpg", "a.tga",  "a.bmp", "a.hdr", "a.ppm",
-                                        "a.dpx", "a.jp2", "a.webp", "a.dds", "a.gif", "a.psd"};
+    static const char *const names[] = {"a.tif", "a.jpg",  "a.tga", "a.bmp", "a.hdr", "a.ppm",
+                                        "a.jp2", "a.webp", "a.dds", "a.gif", "a.psd"};
     if (size == 0) {
         return 0;
     }

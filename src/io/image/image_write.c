@@ -277,7 +277,7 @@ static const vshi_format png_format = {
 
 /* Plans a format of OpenImageIO. */
 static vsh_result plan_other(const char *path, const char *ending, write_plan *plan, vsh_error *error) {
-    static const char others[] = "tif, jpg, tga, bmp, hdr, ppm, pgm, webp, jp2, dpx, gif";
+    static const char others[] = "tif, jpg, tga, bmp, hdr, ppm, pgm, webp";
     VSHI_TRY(vshi_oiio_load(path, error));
     const char *refusal;
     const bool found = vshi_oiio()->format(path, &plan->format, &refusal);

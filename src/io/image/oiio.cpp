@@ -26,12 +26,11 @@ using vshi::guard;
 
 // --- formats
 
-constexpr int32_t BITS_8_16 = VSHI_BITS_8 | VSHI_BITS_16;
-constexpr int32_t BITS_ALL = BITS_8_16 | VSHI_BITS_32;
+constexpr int32_t BITS_ALL = VSHI_BITS_8 | VSHI_BITS_16 | VSHI_BITS_32;
 constexpr int32_t ANY_SIZE = INT_MAX;
 
 // Sizes are the formats' own limits; jpeg's is lower, because libjpeg ends the process above its own. webp
-// and gif drop the colour of transparent pixels, so they count as formats without alpha. `held` comes from
+// drops the colour of transparent pixels, so it counts as a format without alpha. `held` comes from
 // measured peak memory: 4096² pixels, written eight rows at a time.
 constexpr vshi_format writable[] = {
     // name, bits, alpha, grey, named, size, held
@@ -42,9 +41,6 @@ constexpr vshi_format writable[] = {
     {"hdr", VSHI_BITS_32, false, false, false, ANY_SIZE, 0.0},
     {"pnm", VSHI_BITS_8, false, false, false, ANY_SIZE, 0.0},
     {"webp", VSHI_BITS_8, false, false, false, 16383, 2.2},
-    {"jpeg2000", BITS_8_16, true, false, false, ANY_SIZE, 7.0},
-    {"dpx", BITS_ALL, true, false, false, ANY_SIZE, 1.0},
-    {"gif", VSHI_BITS_8, false, false, false, 65535, 8.2},
 };
 
 // Endings and formats that OpenImageIO knows, but does not write correctly.
@@ -57,7 +53,6 @@ constexpr struct {
     {"pfm", "OpenImageIO 2.4 only reads it"},
     {"pbm", "it has one bit a pixel"},
     {"zfile", "it holds depth, and a file that is cut short is read as whole"},
-    {"j2c", "OpenImageIO 2.4 writes nothing into it; use j2k"},
     {"openexr", "OpenEXR files are to end in .exr"},
     {"null", "it is no file"},
     {"term", "it is no file"},
@@ -70,7 +65,7 @@ constexpr struct {
 
 // Formats that are read but not written. The others are no still images, or their readers are unsafe: iff and
 // ico write past their buffers, iff accepts truncated files, and fits returns the row below.
-const char *const readable_only[] = {"cineon", "dds", "heif", "psd", "softimage"};
+const char *const readable_only[] = {"dds", "gif", "heif", "jpeg2000", "psd"};
 
 constexpr int64_t BAND = int64_t(1) << 20; // values, at least a row
 constexpr int64_t MOST_ROWS = 1024;        // some formats seek for each row
@@ -304,7 +299,7 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const std::string &format, 
     OIIO::ImageSpec spec(planes.width, planes.height, planes.count, type);
     spec.attribute("Software", std::string("vdbshade ") + vsh_version());
     spec.attribute("oiio:UnassociatedAlpha", 1); // else colours are divided by alpha
-    if (format == "tiff" || format == "dpx") {
+    if (format == "tiff") {
         spec.attribute("DateTime", "1970:01:01 00:00:00"); // else the hour: same input, same bytes
     }
     spec.attribute("oiio:BitsPerSample", static_cast<int>(type.size()) * 8);
@@ -322,19 +317,6 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const std::string &format, 
         spec.attribute("oiio:ColorSpace", "sRGB"); // not for data: readers would undo the curve
     }
     return spec;
-}
-
-// Removes the temporary file's name from the header of dpx: same input, same bytes.
-int clear_name(const char *temporary) {
-    constexpr off_t PLACE = 36;
-    constexpr size_t SIZE = 100;
-    const char none[SIZE] = {0};
-    const int file = ::open(temporary, O_WRONLY | O_CLOEXEC);
-    const int number = file >= 0 && ::pwrite(file, none, SIZE, PLACE) == ssize_t(SIZE) ? 0 : errno;
-    if (file >= 0) {
-        ::close(file);
-    }
-    return number;
 }
 
 // Writes values of `bits` bits through OpenImageIO. This class makes the integers, without alpha or transfer
@@ -398,20 +380,12 @@ class Writer {
     }
 
     vsh_result close(vsh_error *error) {
-        const bool whole = row_ == height_;
-        if (row_ == 0 && output_ != nullptr) { // without rows, the writer of JPEG 2000 leaks its image
-            filled_ = step_;
-            flush(nullptr);
-        }
         const bool closed = output_ != nullptr && output_->close();
         const std::string text = output_ != nullptr ? output_->geterror() : "";
         output_.reset();
-        int number = file_.finish();
+        const int number = file_.finish();
         if (number == 0 && !closed) {
             return fail(error, reason(text));
-        }
-        if (number == 0 && whole && std::strcmp(format_.name, "dpx") == 0) {
-            number = clear_name(temporary_);
         }
         return number == 0 ? VSH_OK : fail(error, std::strerror(number));
     }
