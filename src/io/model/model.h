@@ -218,8 +218,7 @@ vshi_read_model_fn vshi_obj_read, vshi_ply_read, vshi_gltf_read, vshi_assimp_rea
 #define VSHI_FORMATS                                                                                         \
     "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
 
-/* Fails with VSH_ERROR_INPUT, naming the formats that are read, for files of Blender, Alembic or USD. The
- * first bytes decide, and the ending. Thread safe. */
+/* Fails with VSH_ERROR_INPUT, naming the formats that are read, for endings of Blender, Alembic or USD. */
 vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 
 /* --- other files of a model (beside.c) */
