@@ -155,105 +155,6 @@ json_t *vshi_lit_uri(const char *name) {
     return uri;
 }
 
-/* --- JSON: members in their order, and the shortest numbers that read back as they were */
-
-typedef struct writer {
-    FILE *to;
-    bool lines;
-    int depth;
-} writer;
-
-static void write_string(const writer *w, const char *string, size_t size) {
-    size_t plain = 0; /* start of the bytes not written yet */
-    fputc('"', w->to);
-    for (size_t i = 0; i < size; ++i) {
-        const unsigned char byte = (unsigned char)string[i];
-        if (byte < 0x20 || byte == '"' || byte == '\\') {
-            fwrite(string + plain, 1, i - plain, w->to);
-            fprintf(w->to, byte >= 0x20 ? "\\%c" : "\\u%04x", byte);
-            plain = i + 1;
-        }
-    }
-    fwrite(string + plain, 1, size - plain, w->to);
-    fputc('"', w->to);
-}
-
-static void begin_line(const writer *w) {
-    if (w->lines) {
-        fprintf(w->to, "\n%*s", 2 * w->depth, "");
-    }
-}
-
-static void write_value(writer *w, const json_t *value);
-
-static void write_object(writer *w, const json_t *object) {
-    const char *name;
-    json_t *member;
-    bool first = true;
-    fputc('{', w->to);
-    ++w->depth;
-    json_object_foreach((json_t *)(uintptr_t)object, name, member) {
-        fputs(first ? "" : ",", w->to);
-        first = false;
-        begin_line(w);
-        write_string(w, name, strlen(name));
-        fputs(w->lines ? ": " : ":", w->to);
-        write_value(w, member);
-    }
-    --w->depth;
-    if (!first) {
-        begin_line(w);
-    }
-    fputc('}', w->to);
-}
-
-/* Lists of numbers stay in one line. */
-static void write_array(writer *w, const json_t *array) {
-    size_t i;
-    const json_t *item;
-    const bool short_one =
-        !json_is_object(json_array_get(array, 0)) && !json_is_array(json_array_get(array, 0));
-    fputc('[', w->to);
-    ++w->depth;
-    json_array_foreach(array, i, item) {
-        fputs(i == 0 ? "" : w->lines && short_one ? ", " : ",", w->to);
-        if (!short_one) {
-            begin_line(w);
-        }
-        write_value(w, item);
-    }
-    --w->depth;
-    if (!short_one) {
-        begin_line(w);
-    }
-    fputc(']', w->to);
-}
-
-static void write_value(writer *w, const json_t *value) {
-    char number[VSHI_DECIMAL_ROOM];
-    switch (json_typeof(value)) {
-    case JSON_OBJECT:
-        write_object(w, value);
-        break;
-    case JSON_ARRAY:
-        write_array(w, value);
-        break;
-    case JSON_STRING:
-        write_string(w, json_string_value(value), json_string_length(value));
-        break;
-    case JSON_INTEGER:
-        fprintf(w->to, "%" JSON_INTEGER_FORMAT, json_integer_value(value));
-        break;
-    case JSON_REAL:
-        fwrite(number, 1, (size_t)(vshi_decimal_write_double(number, json_real_value(value)) - number),
-               w->to);
-        break;
-    default:
-        fputs(json_is_true(value) ? "true" : json_is_false(value) ? "false" : "null", w->to);
-        break;
-    }
-}
-
 /* --- the buffers become one, of the bytes that buffer views have */
 
 enum { ALIGNMENT = 8 }; /* of ranges, so that the alignment of accessors in them stays */
@@ -492,22 +393,18 @@ static vsh_result write_chunks(const writing *w, const char *json, size_t json_s
     return VSH_OK;
 }
 
-/* Writes the JSON, with lines and indents, or a GLB with the JSON first, whose size precedes it. */
+/* Writes the JSON, with lines and indents, or a GLB. */
 static vsh_result write_document(const writing *w, bool binary, FILE *to, vsh_error *error) {
-    char *json = NULL;
-    size_t size = 0;
-    writer text = {.to = binary ? open_memstream(&json, &size) : to, .lines = !binary};
-    if (text.to == NULL) {
+    char *json = json_dumps(w->work->gltf.root, binary ? JSON_COMPACT : JSON_INDENT(2));
+    if (json == NULL) {
         return vshi_lit_fail_memory(w->work, error);
     }
-    write_value(&text, w->work->gltf.root);
-    if (!binary) {
-        fputc('\n', to);
-        return VSH_OK;
+    vsh_result result = VSH_OK;
+    if (binary) {
+        result = write_chunks(w, json, strlen(json), to, error);
+    } else {
+        fprintf(to, "%s\n", json);
     }
-    const bool failed = ferror(text.to) != 0;
-    const vsh_result result = fclose(text.to) != 0 || failed ? vshi_lit_fail_memory(w->work, error)
-                                                             : write_chunks(w, json, size, to, error);
     free(json);
     return result;
 }
