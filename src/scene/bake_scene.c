@@ -154,7 +154,6 @@ static vsh_result load(vshi_scene_bake *bake, const vsh_scene *scene, const vsh_
     const vshi_array arrays[] = {VSHI_ARRAY(bake->errors, bake->error_count),
                                  VSHI_ARRAY(bake->lit, bake->error_count)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "bake", error));
-    VSHI_TRY(vshi_check_assets(bake, error));
     bake->report.lightmap_count = bake->target_count;
     bake->report.load_s = vshi_seconds() - start;
     return bake->options.loaded != NULL

@@ -140,9 +140,6 @@ vsh_result vshi_list_lightmaps(vshi_scene_bake *bake, vsh_error *error);
 /* A receiver's image, with its bits, packing and colours. */
 vsh_image_options vshi_receiver_image(const vsh_receiver *receiver);
 
-/* Checks that assets have room for the UVs of their new atlases. Errors: as vshi_lit_check_free_set(). */
-vsh_result vshi_check_assets(const vshi_scene_bake *bake, vsh_error *error);
-
 /* Writes a finished page: its image, its picture of invalid texels, and with a receiver's last page its
  * asset. Hands its rows to the caller instead if wanted. */
 vsh_result vshi_write_page(const vshi_scene_page *page, vsh_error *error);

@@ -482,7 +482,6 @@ static vsh_result list_meshes(asset *a, const size_t *numbers, const char *outpu
 
 /* Lists the images of all pages, at most two each. */
 static vsh_result list_images(asset *a, const char *output, vsh_error *error) {
-    static const vshi_lit_page unknown;
     const vsh_scene *scene = &a->bake->scene;
     const int32_t light_planes = count_light_planes(scene);
     const bool preview = is_preview(a->bake, output);
@@ -490,7 +489,7 @@ static vsh_result list_images(asset *a, const char *output, vsh_error *error) {
                                  VSHI_ARRAY(a->names, a->page_count)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, output, error));
     for (size_t i = 0; i < a->page_count; ++i) {
-        const vshi_lit_page *page = a->pages != NULL ? &a->pages[i] : &unknown;
+        const vshi_lit_page *page = &a->pages[i];
         vsh_lit_image image = {.page = (uint32_t)i,
                                .width = page->width,
                                .height = page->height,
@@ -515,7 +514,7 @@ static vsh_result list_images(asset *a, const char *output, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Writes a receiver's asset from its pages; without pages checks that the file has room for their UVs. */
+/* Writes a receiver's asset from its pages. */
 static vsh_result write_asset(const vshi_scene_bake *bake, size_t index, const vshi_lit_page *pages,
                               vsh_error *error) {
     const vsh_receiver *receiver = &bake->scene.receivers[index];
@@ -533,33 +532,16 @@ static vsh_result write_asset(const vshi_scene_bake *bake, size_t index, const v
     vsh_result result;
     VSHI_TRY_DONE(list_images(&a, output, error));
     VSHI_TRY_DONE(list_meshes(&a, numbers, output, error));
-    if (pages == NULL) {
-        result = vshi_lit_check_free_set(path, a.model, a.meshes, &a.options, &run, error);
-    } else {
-        a.options.page_names = a.names;
-        a.options.page_count = a.page_count;
-        a.options.attributes = vsh_provenance_attributes(bake->provenance, &a.options.attribute_count);
-        result = vsh_lit_write(path, a.model, a.meshes, &a.options, output, &run, error);
-    }
+    a.options.page_names = a.names;
+    a.options.page_count = a.page_count;
+    a.options.attributes = vsh_provenance_attributes(bake->provenance, &a.options.attribute_count);
+    result = vsh_lit_write(path, a.model, a.meshes, &a.options, output, &run, error);
 done:
     free(a.chart_pages);
     free(a.names);
     free(a.images);
     free(a.meshes);
     return result;
-}
-
-vsh_result vshi_check_assets(const vshi_scene_bake *bake, vsh_error *error) {
-    for (size_t i = 0; i < bake->scene.receiver_count && bake->options.rows == NULL; ++i) {
-        const char *output = bake->scene.receivers[i].output;
-        const size_t *numbers;
-        /* without an atlas no set is made, and an OBJ has one set alone */
-        if (vsh_lit_is_output(output) && strcasecmp(vshi_path_ending(output), "obj") != 0 &&
-            vshi_assets_receiver_atlas(bake->assets, i, &numbers) != NULL) {
-            VSHI_TRY(write_asset(bake, i, NULL, error));
-        }
-    }
-    return VSH_OK;
 }
 
 /* Keeps a page for its asset, and writes the asset with the last one. */

@@ -192,13 +192,7 @@ TEST(images_out_of_range_are_refused) {
                                      path_of("out.glb").text, NULL, &failure),
                        "");
         assert_int_equal(failure.code, VSH_ERROR_ARGUMENT);
-        /* before there are images, their purposes count */
-        assert_int_equal(
-            vshi_lit_check_free_set(path_of("in.glb").text, l.model, l.lit, &options, NULL, &failure),
-            i < 2 ? VSH_ERROR_ARGUMENT : VSH_OK);
     }
-    assert_fails(vshi_lit_check_free_set(NULL, l.model, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
-    assert_fails(vshi_lit_check_free_set(NULL, NULL, l.lit, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "");
 }
 
 TEST(outputs_that_are_inputs_are_refused) {

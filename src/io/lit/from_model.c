@@ -193,7 +193,7 @@ static vsh_result add_new_set(maker *m, json_t *made, const vsh_lit_mesh *lit, s
     const vsh_result result = add_set(m, json_object_get(made, "attributes"), set, lit->uvs, NULL,
                                       lit->vertex_count, values, error);
     free(values);
-    return result == VSH_OK ? vshi_lit_note_set(m->work, made, set, error) : result;
+    return result;
 }
 
 /* Appends the primitives that `made`, with all attributes, becomes. */

@@ -318,52 +318,14 @@ done:
     return result;
 }
 
-/* --- room for new UVs */
+/* --- the call */
 
-static vsh_result check_set(vshi_lit_work *work, size_t entry, vsh_error *error) {
-    const vshi_model_origin *origin = &work->model->entries[entry].origin;
-    const size_t mesh = (size_t)origin->mesh - 1, primitive = (size_t)origin->primitive - 1;
-    const json_t *of = vshi_gltf_element(&work->gltf, "meshes", mesh);
-    json_t *copy = vshi_lit_copy_json(work, json_array_get(json_object_get(of, "primitives"), primitive));
-    char where[96];
-    size_t set;
-    snprintf(where, sizeof where, "meshes[%zu].primitives[%zu]", mesh, primitive);
-    const vsh_result result = vshi_lit_choose_set(work, copy, &work->meshes[entry], where, &set, error);
-    json_decref(copy);
-    return work->refused ? vshi_lit_fail_memory(work, error) : result;
-}
-
-static vsh_result check_sets(vshi_lit_work *work, vsh_error *error) {
-    const bool gltf = work->model_path != NULL && vshi_is_gltf(work->model_path);
-    for (size_t i = 0; gltf && i < vsh_model_mesh_count(work->model); ++i) {
-        if (work->meshes[i].uvs == NULL || vsh_model_uv_sets(work->model, i) < VSH_MAX_UV_SETS) {
-            continue;
-        }
-        if (work->text == NULL) {
-            VSHI_TRY(vshi_lit_open(work, error));
-        }
-        VSHI_TRY(check_set(work, i, error));
-    }
-    return VSH_OK;
-}
-
-/* Planes may be missing when only UVs are checked. */
-static vsh_result check_purposes(const vsh_lit_options *options, vsh_error *error) {
-    for (size_t i = 0; i < options->image_count; ++i) {
-        if (options->images[i].purpose < 0 || options->images[i].purpose >= VSH_LIT_PURPOSES) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_options.images[%zu].purpose is %d", i,
-                             options->images[i].purpose);
-        }
-    }
-    return VSH_OK;
-}
-
-/* --- the calls */
-
-/* Writes the lit model or, with `output` NULL, checks that its new UVs have room. */
-static vsh_result process(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                          const vsh_lit_options *options, const char *output, const vsh_run *run,
-                          vsh_error *error) {
+vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
+                         const vsh_lit_options *options, const char *output, const vsh_run *run,
+                         vsh_error *error) {
+    VSHI_FLOATS;
+    VSHI_NEEDS(model);
+    VSHI_NEEDS(output);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_lit_options own = vsh_lit_options_default();
@@ -380,39 +342,20 @@ static vsh_result process(const char *path, const vsh_model *model, const vsh_li
                           .output = output,
                           .gltf = {.path = path != NULL ? path : output, .run = &full}};
     vsh_result result;
-    VSHI_TRY_DONE(output != NULL ? check_output(&work, error) : check_purposes(&own, error));
+    VSHI_TRY_DONE(check_output(&work, error));
     VSHI_TRY_DONE(count_pages(&work, error));
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY_DONE(check_mesh(&work, i, error));
     }
-    work.gltf.job = vshi_job_begin(&full, "lit", output != NULL ? count + 1 : 1);
+    work.gltf.job = vshi_job_begin(&full, "lit", count + 1);
     if (work.gltf.job == NULL) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory"));
     }
-    VSHI_TRY_DONE(output != NULL ? write_all(&work, error) : check_sets(&work, error));
-    if (output != NULL) {
-        vshi_job_advance(work.gltf.job, 1); /* all is written: too late to stop */
-    }
+    VSHI_TRY_DONE(write_all(&work, error));
+    vshi_job_advance(work.gltf.job, 1); /* all is written: too late to stop */
 done:
     vshi_job_end(work.gltf.job);
     vshi_lit_work_free(&work);
     free(made);
     return result;
-}
-
-vsh_result vshi_lit_check_free_set(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                                   const vsh_lit_options *options, const vsh_run *run, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    VSHI_NEEDS(meshes);
-    return process(path, model, meshes, options, NULL, run, error);
-}
-
-vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                         const vsh_lit_options *options, const char *output, const vsh_run *run,
-                         vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    VSHI_NEEDS(output);
-    return process(path, model, meshes, options, output, run, error);
 }

@@ -70,10 +70,8 @@ done:
     return result;
 }
 
-/* --- the set that new UVs become. They replace the file's lightmap set, or a set of an earlier bake, which
- * the extras of a primitive list ("vdbshade_uv_sets": [1]). */
-
-static const char sets_key[] = "vdbshade_uv_sets";
+/* --- the set that new UVs become. They replace the file's lightmap set, or a later one of a texture that a
+ * bake replaces, unless a texture that stays uses it. */
 
 /* The purposes that have an image on all pages of a mesh, as bits 1 << VSH_LIT_…. */
 static uint32_t find_purposes(const vshi_lit_work *work, const vsh_lit_mesh *mesh) {
@@ -171,19 +169,6 @@ static bool is_replaceable(const vshi_lit_work *work, const json_t *primitive, s
     return !is_shown(work, primitive, set, purposes);
 }
 
-/* --- sets of earlier bakes */
-
-static bool is_made(const json_t *primitive, size_t set) {
-    size_t i;
-    json_t *number;
-    json_array_foreach(json_object_get(json_object_get(primitive, "extras"), sets_key), i, number) {
-        if (json_is_integer(number) && json_integer_value(number) == (json_int_t)set) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Counts UV sets, up to VSH_MAX_UV_SETS. */
 static size_t count_sets(const json_t *attributes) {
     char name[SET_NAME];
@@ -194,45 +179,19 @@ static size_t count_sets(const json_t *attributes) {
     return set;
 }
 
-static void drop_set(json_t *primitive, size_t set) {
-    char name[SET_NAME];
-    json_object_del(json_object_get(primitive, "attributes"), name_set(set, name));
-}
-
-vsh_result vshi_lit_note_set(vshi_lit_work *work, json_t *primitive, size_t set, vsh_error *error) {
-    json_t *extras = json_object_get(primitive, "extras");
-    if (extras != NULL && !json_is_object(extras)) {
-        return VSH_OK; /* another program's, of another kind */
-    }
-    VSHI_TRY(vshi_lit_find_object(work, primitive, "extras", &extras, error));
-    json_t *list = json_array();
-    const size_t count = count_sets(json_object_get(primitive, "attributes"));
-    for (size_t i = 0; i <= count || i <= set; ++i) {
-        if (i == set || (i < count && is_made(primitive, i))) {
-            vshi_lit_push(work, list, json_integer((json_int_t)i));
-        }
-    }
-    vshi_lit_set(work, extras, sets_key, list);
-    return VSH_OK;
-}
-
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error) {
     const uint32_t purposes = find_purposes(work, mesh);
-    size_t count = count_sets(json_object_get(primitive, "attributes"));
-    *set = 0;
-    while (*set < count && !((*set == VSHI_LIT_SET || is_made(primitive, *set)) &&
+    json_t *attributes = json_object_get(primitive, "attributes");
+    const size_t count = count_sets(attributes);
+    char name[SET_NAME];
+    *set = VSHI_LIT_SET;
+    while (*set < count && !((*set == VSHI_LIT_SET || is_shown(work, primitive, *set, 0)) &&
                              is_replaceable(work, primitive, *set, purposes))) {
         ++*set;
     }
-    /* sets have no gaps, so only the last of the others can go */
-    while (count > *set + 1 && count < VSH_MAX_UV_SETS && is_made(primitive, count - 1) &&
-           is_replaceable(work, primitive, count - 1, purposes)) {
-        drop_set(primitive, --count);
-    }
-    if (*set < count) {
-        drop_set(primitive, *set);
-    }
+    *set = *set < count ? *set : count;
+    json_object_del(attributes, name_set(*set, name));
     if (*set < VSH_MAX_UV_SETS) {
         return VSH_OK;
     }
@@ -558,7 +517,6 @@ static vsh_result make_new(primitive *p, json_t *list, vsh_error *error) {
     }
     VSHI_TRY(p->split ? make_split(p, &uvs, &split, error) : share_uvs(p, &uvs, error));
     vshi_lit_set_number(work, json_object_get(p->made, "attributes"), name_set(set, name), uvs);
-    VSHI_TRY(vshi_lit_note_set(work, p->made, set, error));
     const uint32_t only = find_only_page(work, p->lit);
     if (!p->split && only != VSH_NO_CHART) { /* indices stay, also those of strips */
         vshi_lit_push(work, list, json_incref(p->made));

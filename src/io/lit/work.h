@@ -282,14 +282,11 @@ vsh_result vshi_lit_make_primitive(vshi_lit_work *work, size_t mesh, size_t prim
 /* Whether two atlases have split a mesh into the same vertices and triangles. */
 bool vshi_lit_is_split_alike(const vsh_lit_mesh *a, const vsh_lit_mesh *b);
 
-/* Removes the sets of a primitive that new UVs of `mesh` replace, and finds the set for these: the first that
- * is VSHI_LIT_SET or of an earlier bake and that no remaining texture uses, else a new one. Errors:
- * VSH_ERROR_LIMIT (VSH_MAX_UV_SETS). */
+/* Finds the set for new UVs of `mesh`, and removes it from the primitive: VSHI_LIT_SET, or a later one of
+ * textures that are replaced, if no remaining texture uses it; else a new one. Errors: VSH_ERROR_LIMIT
+ * (VSH_MAX_UV_SETS). */
 vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
                                const char *where, size_t *set, vsh_error *error);
-
-/* Notes in a primitive's extras that a set was made, for the next bake. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_note_set(vshi_lit_work *work, json_t *primitive, size_t set, vsh_error *error);
 
 /* Corners of a mesh's triangles, and its set of UVs. */
 typedef struct vshi_lit_corners {
@@ -356,10 +353,3 @@ vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *bes
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_lit_write_model(const vsh_model *model, const char *path, const vsh_run *run, vshi_job *job,
                                 FILE *to, vsh_error *error);
-
-/* Checks before a long bake that every mesh with new UVs has room for them in `path`, a .glb or .gltf.
- * Arguments as vsh_lit_write(); of images it reads purpose and page alone. Errors: VSH_ERROR_LIMIT (a
- * primitive has VSH_MAX_UV_SETS sets, and the new one replaces none), VSH_ERROR_ARGUMENT, VSH_ERROR_INPUT,
- * VSH_ERROR_READ, VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_check_free_set(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
-                                   const vsh_lit_options *options, const vsh_run *run, vsh_error *error);
