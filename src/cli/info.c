@@ -3,9 +3,7 @@
 
 #include <stdarg.h>
 
-#define IMAGE_ENDINGS                                                                                        \
-    "exr png tif tiff jpg jpeg hdr tga bmp webp psd pgm ppm pnm pfm gif jp2 j2k sgi rgb rla ico heic "   \
-    "heif avif"
+#define IMAGE_ENDINGS "exr png tif tiff jpg jpeg hdr tga bmp webp psd pgm ppm pnm pfm gif jp2 dds heic avif"
 
 typedef struct info_settings {
     int32_t size[2]; /* texels of the lightmap that UVs are checked in */

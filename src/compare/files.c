@@ -616,19 +616,10 @@ static vsh_result find_tolerances(files *f, vsh_error *error) {
     return vshi_tolerances_read(file, &f->tolerances, error);
 }
 
-/* Maps endings of one format to one name. */
+/* Maps the endings of one format to one name. */
 static const char *format_of(const char *path) {
-    static const struct {
-        const char *ending, *format;
-    } other[] = {{"tiff", "tif"}, {"jpeg", "jpg"}, {"jpe", "jpg"},   {"jif", "jpg"},
-                 {"jfif", "jpg"}, {"jfi", "jpg"},  {"heif", "heic"}, {"rgbe", "hdr"}};
     const char *ending = vshi_path_ending(path);
-    for (size_t i = 0; i < sizeof other / sizeof other[0]; ++i) {
-        if (strcasecmp(other[i].ending, ending) == 0) {
-            return other[i].format;
-        }
-    }
-    return ending;
+    return strcasecmp(ending, "tiff") == 0 ? "tif" : strcasecmp(ending, "jpeg") == 0 ? "jpg" : ending;
 }
 
 static vsh_result compare(files *f, vsh_error *error) {

@@ -43,7 +43,7 @@ static int parse_shard(void *at, const char *name, const char *value) {
 static const cli_option options[] = {
     {.help = "Most used"},
     {"output", "OUT",
-     "image to write: .exr with named channels, or .png .tif .tga .bmp .hdr .ppm .pgm .jpg .webp; what each "
+     "image to write: .exr with named channels, or .png .tif .tga .bmp .hdr .ppm .jpg .webp; what each "
      "can hold, and what is not written: docs/formats.md; .glb .gltf .obj: the input with its light in its "
      "materials (docs/lit.md)",
      CLI_VALUE(TEXT, cli_bake_settings, output)},

@@ -177,7 +177,6 @@ typedef struct vshi_format {
     const char *name; /* in OpenImageIO, if that writes it */
     int32_t bits;     /* VSHI_BITS_… that can be written: 8 and 16 are integers, 32 is float */
     bool alpha;       /* keeps A, and R, G and B where A is 0 */
-    bool grey;        /* one channel, R */
     bool named;       /* EXR: any channels, by their names; 16 bits are half floats */
     int32_t max_size; /* pixels along a side */
     double held;      /* bytes that the writer keeps until the end, for each byte of a value */
@@ -241,11 +240,10 @@ vsh_result vshi_png_encode(const vshi_png_source *source, const char *what, unsi
 typedef struct vshi_oiio_table {
     const char *version; /* of the headers that the module was built with */
 
-    /* Finds the format of the path's ending; returns false if it cannot be written. *refusal is the reason
-     * for some of OpenImageIO's endings, a static string, else NULL. Thread safe. */
-    bool (*format)(const char *path, vshi_format *format, const char **refusal);
+    /* Finds the format of the path's ending; returns false if it cannot be written. Thread safe. */
+    bool (*format)(const char *path, vshi_format *format);
 
-    /* Writes R, G, B and perhaps A, or R alone where the format is grey. */
+    /* Writes R, G, B and perhaps A. */
     vshi_codec codec;
 
     /* Reads the file at `path`, whose ending tells the format, or `bytes`, which messages call `path`. */

@@ -277,19 +277,13 @@ static const vshi_format png_format = {
 
 /* Plans a format of OpenImageIO. */
 static vsh_result plan_other(const char *path, const char *ending, write_plan *plan, vsh_error *error) {
-    static const char others[] = "tif, jpg, tga, bmp, hdr, ppm, pgm, webp";
     VSHI_TRY(vshi_oiio_load(path, error));
-    const char *refusal;
-    const bool found = vshi_oiio()->format(path, &plan->format, &refusal);
-    if (refusal != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: '%s' is not written: %s; expected one of exr, png, %s", path, ending, refusal,
-                         others);
-    }
     plan->codec = &vshi_oiio()->codec;
-    return found ? VSH_OK
-                 : vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: ending '%s': expected one of exr, png, %s", path,
-                             ending, others);
+    return vshi_oiio()->format(path, &plan->format)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_ARGUMENT,
+                           "%s: ending '%s': expected one of exr, png, tif, jpg, tga, bmp, hdr, ppm, webp",
+                           path, ending);
 }
 
 static vsh_result plan_format(const char *path, write_plan *plan, vsh_error *error) {
@@ -348,15 +342,6 @@ static vsh_result fit_pack(const char *path, const vshi_format *format, bool ask
         }
         entries[ALPHA].given = false;
     }
-    for (int key = 1; key < ALPHA && format->grey; ++key) {
-        if (asked && entries[key].given &&
-            (!entries[0].given || entries[key].channel != entries[0].channel ||
-             entries[key].constant != entries[0].constant)) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: %s is not R, but the format is grey", path,
-                             keys[key]);
-        }
-        entries[key].given = false;
-    }
     return VSH_OK;
 }
 
@@ -388,7 +373,6 @@ static vsh_result plan_picture(const char *path, const vsh_image *image, write_p
                          "%s: pack: '%s': no channel shadow.NAME, ao or irradiance to make a picture of",
                          path, pack_picture);
     }
-    plan->planes.count = plan->format.grey ? 1 : plan->planes.count;
     for (int32_t c = 0; c < image->channel_count && plan->format.alpha; ++c) {
         if (strcmp(image->names[c], keys[ALPHA]) == 0) {
             add_plane(plan, c, (vshi_image_plane){.name = keys[ALPHA]});
@@ -407,7 +391,7 @@ static vsh_result plan_pack(const char *path, const vsh_image *image, const char
     for (int key = 0; key < KEYS; ++key) {
         const pack_entry *entry = &made[key];
         /* formats other than EXR always have R, G and B: by default 0 */
-        if (entry->given || (!plan->format.named && key < (plan->format.grey ? 1 : ALPHA))) {
+        if (entry->given || (!plan->format.named && key < ALPHA)) {
             const int32_t channel = entry->given ? entry->channel : -1;
             add_plane(plan, channel,
                       (vshi_image_plane){.name = keys[key],

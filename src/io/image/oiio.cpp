@@ -16,6 +16,7 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <strings.h>
 #include <type_traits>
 #include <unistd.h>
 #include <vector>
@@ -29,78 +30,50 @@ using vshi::guard;
 constexpr int32_t BITS_ALL = VSHI_BITS_8 | VSHI_BITS_16 | VSHI_BITS_32;
 constexpr int32_t ANY_SIZE = INT_MAX;
 
-// Sizes are the formats' own limits; jpeg's is lower, because libjpeg ends the process above its own. webp
-// drops the colour of transparent pixels, so it counts as a format without alpha. `held` comes from
-// measured peak memory: 4096² pixels, written eight rows at a time.
-constexpr vshi_format writable[] = {
-    // name, bits, alpha, grey, named, size, held
-    {"tiff", BITS_ALL, true, false, false, ANY_SIZE, 0.0},
-    {"jpeg", VSHI_BITS_8, false, false, false, 65500, 0.3},
-    {"targa", VSHI_BITS_8, true, false, false, 65535, 0.0},
-    {"bmp", VSHI_BITS_8, true, false, false, 1000000, 0.0},
-    {"hdr", VSHI_BITS_32, false, false, false, ANY_SIZE, 0.0},
-    {"pnm", VSHI_BITS_8, false, false, false, ANY_SIZE, 0.0},
-    {"webp", VSHI_BITS_8, false, false, false, 16383, 2.2},
+struct Format {
+    const char *ending;
+    vshi_format format; // its name is OpenImageIO's
 };
 
-// Endings and formats that OpenImageIO knows, but does not write correctly.
-constexpr char UNCHECKED[] = "OpenImageIO 2.4 does not tell whether its bytes arrived";
-constexpr struct {
-    const char *name;
-    const char *reason;
-} refused[] = {
-    {"fits", "OpenImageIO 2.4 puts its rows one too far and its colours along the wrong axis"},
-    {"pfm", "OpenImageIO 2.4 only reads it"},
-    {"pbm", "it has one bit a pixel"},
-    {"zfile", "it holds depth, and a file that is cut short is read as whole"},
-    {"openexr", "OpenEXR files are to end in .exr"},
-    {"null", "it is no file"},
-    {"term", "it is no file"},
-    {"iff", "a file that is cut short is read as whole"},
-    {"heif", UNCHECKED},
-    {"ico", UNCHECKED},
-    {"rla", UNCHECKED},
-    {"sgi", UNCHECKED},
+// Formats without bits are read only. Sizes are the formats' own limits; jpeg's is lower, because libjpeg
+// ends the process above its own. webp drops the colour of transparent pixels, so it counts as a format
+// without alpha. `held` comes from measured peak memory: 4096² pixels, written eight rows at a time.
+// OpenImageIO 2.4 knows more formats, but does not tell if a disk is full, or reads cut files as whole.
+constexpr vshi_format TIFF = {"tiff", BITS_ALL, true, false, ANY_SIZE, 0.0};
+constexpr vshi_format JPEG = {"jpeg", VSHI_BITS_8, false, false, 65500, 0.3};
+constexpr Format formats[] = {
+    // ending, then name, bits, alpha, named, size, held
+    {"tif", TIFF},
+    {"tiff", TIFF},
+    {"jpg", JPEG},
+    {"jpeg", JPEG},
+    {"tga", {"targa", VSHI_BITS_8, true, false, 65535, 0.0}},
+    {"bmp", {"bmp", VSHI_BITS_8, true, false, 1000000, 0.0}},
+    {"hdr", {"hdr", VSHI_BITS_32, false, false, ANY_SIZE, 0.0}},
+    {"ppm", {"pnm", VSHI_BITS_8, false, false, ANY_SIZE, 0.0}},
+    {"webp", {"webp", VSHI_BITS_8, false, false, 16383, 2.2}},
+    {"pgm", {"pnm", 0, false, false, 0, 0.0}},
+    {"pnm", {"pnm", 0, false, false, 0, 0.0}},
+    {"pfm", {"pnm", 0, false, false, 0, 0.0}},
+    {"dds", {"dds", 0, false, false, 0, 0.0}},
+    {"gif", {"gif", 0, false, false, 0, 0.0}},
+    {"heic", {"heif", 0, false, false, 0, 0.0}},
+    {"avif", {"heif", 0, false, false, 0, 0.0}},
+    {"jp2", {"jpeg2000", 0, false, false, 0, 0.0}},
+    {"psd", {"psd", 0, false, false, 0, 0.0}},
 };
-
-// Formats that are read but not written. The others are no still images, or their readers are unsafe: iff and
-// ico write past their buffers, iff accepts truncated files, and fits returns the row below.
-const char *const readable_only[] = {"dds", "gif", "heif", "jpeg2000", "psd"};
 
 constexpr int64_t BAND = int64_t(1) << 20; // values, at least a row
 constexpr int64_t MOST_ROWS = 1024;        // some formats seek for each row
 
-// Returns the ending in lower case, without the dot.
-std::string find_ending(const char *path) {
-    std::string result = vshi_path_ending(path);
-    std::transform(result.begin(), result.end(), result.begin(),
-                   [](unsigned char c) { return static_cast<char>(c >= 'A' && c <= 'Z' ? c + 32 : c); });
-    return result;
-}
-
-// Returns OpenImageIO's name of the format with this ending, "tiff" for "tif", or "". The list is
-// "tiff:tif,tiff,tx;jpeg:jpg,…".
-std::string find_name(const std::string &ending) {
-    const std::string list = OIIO::get_string_attribute("extension_list");
-    for (size_t at = 0; !ending.empty() && at < list.size();) {
-        const size_t end = std::min(list.find(';', at), list.size());
-        const size_t colon = list.find(':', at);
-        if (colon < end) {
-            const std::string endings = "," + list.substr(colon + 1, end - colon - 1) + ",";
-            if (endings.find("," + ending + ",") != std::string::npos) {
-                return list.substr(at, colon - at);
-            }
+// Returns the format of a path's ending, of any case, or nullptr.
+const vshi_format *format_of(const char *path) {
+    for (const Format &entry : formats) {
+        if (strcasecmp(vshi_path_ending(path), entry.ending) == 0) {
+            return &entry.format;
         }
-        at = end + 1;
     }
-    return "";
-}
-
-bool is_readable(const std::string &name) {
-    const auto same = [&](const char *other) { return name == other; };
-    const auto is = [&](const vshi_format &format) { return name == format.name; };
-    return std::any_of(std::begin(readable_only), std::end(readable_only), same) ||
-           std::any_of(std::begin(writable), std::end(writable), is);
+    return nullptr;
 }
 
 // Returns the number of rows that OpenImageIO gets at a time.
@@ -108,25 +81,10 @@ int count_band_rows(int64_t width, int64_t height, int64_t count) {
     return static_cast<int>(std::clamp<int64_t>(BAND / (width * count), 1, std::min(height, MOST_ROWS)));
 }
 
-bool find_format(const char *path, vshi_format *format, const char **refusal) {
-    bool found = false;
-    *refusal = nullptr;
-    guard(nullptr, VSH_ERROR_INTERNAL, path, [&]() -> vsh_result {
-        const std::string ending = find_ending(path);
-        const std::string name = find_name(ending);
-        for (const auto &entry : refused) {
-            *refusal = ending == entry.name || name == entry.name ? entry.reason : *refusal;
-        }
-        for (const vshi_format &entry : writable) {
-            if (name == entry.name) {
-                *format = entry;
-                format->grey = ending == "pgm";
-                found = true;
-            }
-        }
-        return VSH_OK;
-    });
-    return found;
+bool find_format(const char *path, vshi_format *format) {
+    const vshi_format *found = format_of(path);
+    *format = found != nullptr ? *found : vshi_format{};
+    return format->bits != 0;
 }
 
 // --- reading
@@ -173,12 +131,12 @@ vsh_result read_rows(OIIO::ImageInput &input, const char *path, vsh_image_file &
 
 vsh_result read_file(const char *path, const vshi_image_bytes *bytes, const vsh_run *run,
                      vsh_image_file **file, vsh_error *error) {
-    const std::string ending = bytes != nullptr ? bytes->format : find_ending(path);
-    const std::string name = bytes != nullptr ? bytes->format : find_name(ending);
-    if (!is_readable(name)) {
+    const vshi_format *format = bytes == nullptr ? format_of(path) : nullptr;
+    if (bytes == nullptr && format == nullptr) {
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: ending '%s': no image format that is read", path,
-                         ending.c_str());
+                         vshi_path_ending(path));
     }
+    const std::string name = bytes != nullptr ? bytes->format : format->name;
     auto input = OIIO::ImageInput::create(name);
     if (!input) {
         OIIO::geterror();
