@@ -52,11 +52,11 @@ typedef struct line {
     marks sides, closer; /* `closer`: moved towards each other by ROOM and noise */
 } line;
 
-static bool valid(const line *l, size_t i) {
+static bool is_valid(const line *l, size_t i) {
     return l->pair->mask[l->first + i * l->stride] != 0;
 }
 
-static double value(const line *l, int which, size_t i) {
+static double value_at(const line *l, int which, size_t i) {
     return vshi_value_at(l->pair, which, l->first + i * l->stride);
 }
 
@@ -70,7 +70,7 @@ static double length_between(marks m, double a, double b) {
 }
 
 /* Slope along an axis at a texel: a central difference if both neighbours are valid. */
-static double slope(const line *l, int which, size_t i, int axis) {
+static double find_slope(const line *l, int which, size_t i, int axis) {
     const vshi_pair *pair = l->pair;
     const size_t at = l->first + i * l->stride, step = pair->stride[axis];
     size_t place[3];
@@ -88,11 +88,11 @@ static double slope(const line *l, int which, size_t i, int axis) {
 /* Measures the edge between texels `begin` and `end`, which are on different sides. */
 static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
     const marks m = l->sides;
-    const double first = value(l, which, begin), last = value(l, which, end);
+    const double first = value_at(l, which, begin), last = value_at(l, which, end);
     edge e = {.rises = last > first ? 1 : -1, .near = SIZE_MAX};
     double width = 0.0, closer = 0.0, lit = 0.0;
     for (size_t i = begin; i < end; ++i) {
-        const double a = value(l, which, i), b = value(l, which, i + 1);
+        const double a = value_at(l, which, i), b = value_at(l, which, i + 1);
         width += length_between(m, a, b);
         closer += length_between(l->closer, a, b);
         lit += 0.5 * (fmin(m.high, fmax(m.low, a)) + fmin(m.high, fmax(m.low, b))) - m.low;
@@ -106,7 +106,7 @@ static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
     for (int axis = 0; axis < 3; ++axis) {
         double sum = 0.0; /* trapezia along the line, as across it: errors cancel */
         for (size_t i = begin; i <= end && l->pair->size[axis] > 1; ++i) {
-            sum += (i == begin || i == end ? 0.5 : 1.0) * slope(l, which, i, axis);
+            sum += (i == begin || i == end ? 0.5 : 1.0) * find_slope(l, which, i, axis);
         }
         along = axis == l->axis ? fabs(sum) : along;
         squares += sum * sum;
@@ -121,7 +121,7 @@ static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
 static bool find_crossing(const line *l, int which, size_t crossing[2]) {
     int side = 0; /* of texel crossing[0]: -1 dark, 1 light */
     for (size_t i = crossing[1]; i < l->count; ++i) {
-        const double v = valid(l, i) ? value(l, which, i) : NAN;
+        const double v = is_valid(l, i) ? value_at(l, which, i) : NAN;
         const int now = v <= l->sides.low ? -1 : v >= l->sides.high ? 1 : 0;
         if (side != 0 && now == -side) {
             crossing[1] = i;
@@ -263,7 +263,7 @@ vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double noise, vsh_measu
 static double length_of(const line *l, int which, size_t begin, size_t end) {
     double length = 0.0;
     for (size_t i = begin; i < end; ++i) {
-        length += length_between(l->sides, value(l, which, i), value(l, which, i + 1));
+        length += length_between(l->sides, value_at(l, which, i), value_at(l, which, i + 1));
     }
     return length;
 }
@@ -272,8 +272,8 @@ static double length_of(const line *l, int which, size_t begin, size_t end) {
  * reaches as far again to both ends. */
 static void add_width(const line *l, size_t begin, size_t end, double *golden, double *off) {
     for (size_t reach = end - begin + 1, k = 0; k < reach; ++k) {
-        begin -= begin > 0 && valid(l, begin - 1);
-        end += end + 1 < l->count && valid(l, end + 1);
+        begin -= begin > 0 && is_valid(l, begin - 1);
+        end += end + 1 < l->count && is_valid(l, end + 1);
     }
     const double width = length_of(l, VSHI_GOLDEN, begin, end);
     *golden += width;

@@ -66,7 +66,7 @@ static bool smooth_slope(const vshi_pair *pair, const size_t place[3], double sl
 }
 
 /* Turns the axes a and b so that matrix[a][b] vanishes (Jacobi 1846); the columns of `axes` turn along. */
-static void turn(double matrix[3][3], double axes[3][3], int a, int b) {
+static void turn_axes(double matrix[3][3], double axes[3][3], int a, int b) {
     if (matrix[a][b] == 0.0) {
         return;
     }
@@ -102,9 +102,9 @@ static void find_directions(registration *r) {
         }
     }
     for (int sweep = 0; sweep < SWEEPS; ++sweep) {
-        turn(tensor, axes, 0, 1);
-        turn(tensor, axes, 0, 2);
-        turn(tensor, axes, 1, 2);
+        turn_axes(tensor, axes, 0, 1);
+        turn_axes(tensor, axes, 0, 2);
+        turn_axes(tensor, axes, 1, 2);
     }
     const double largest = fmax(tensor[0][0], fmax(tensor[1][1], tensor[2][2]));
     for (int e = 0; e < 3; ++e) {

@@ -245,7 +245,7 @@ static double side(const cutting *c, const piece *p, int k) {
     return vshi_dot(world, world);
 }
 
-static void keep(cutting *c, const piece *p) {
+static void keep_piece(cutting *c, const piece *p) {
     if (c->positions != NULL) {
         float *to = c->positions + 9 * c->count;
         for (int k = 0; k < 3; ++k) {
@@ -287,7 +287,7 @@ static bool cut_triangle(cutting *c, size_t triangle) {
             longest = square > longest ? square : longest;
         }
         if (cover == VSHI_MASK_OPAQUE || !(longest > c->size * c->size) || p.depth == DEEPEST) {
-            keep(c, &p);
+            keep_piece(c, &p);
             continue;
         }
         const corner *a = &p.corners[at], *b = &p.corners[(at + 1) % 3], *o = &p.corners[(at + 2) % 3];

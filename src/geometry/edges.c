@@ -143,7 +143,7 @@ static int compare_uses(const void *a, const void *b) {
     return (x->side > y->side) - (x->side < y->side);
 }
 
-static void join(vshi_edges *edges, uint32_t a, uint32_t b) {
+static void join_pair(vshi_edges *edges, uint32_t a, uint32_t b) {
     edges->partner[a] = b;
     edges->partner[b] = a;
 }
@@ -186,7 +186,7 @@ static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         const size_t next = (i + 1) % count;
         if (s[i].downwards && !s[next].downwards && !s[i].joined && !s[next].joined) {
-            join(edges, s[i].side, s[next].side);
+            join_pair(edges, s[i].side, s[next].side);
             s[i].joined = s[next].joined = true;
         }
     }
@@ -199,7 +199,7 @@ static void join_spokes(vshi_edges *edges, spoke *s, size_t count) {
         if (waiting == count) {
             waiting = i;
         } else {
-            join(edges, s[waiting].side, s[i].side);
+            join_pair(edges, s[waiting].side, s[i].side);
             waiting = count;
         }
     }
@@ -278,7 +278,7 @@ static void join_sides(finding *f, size_t parity) {
     f->odd = 0;
     for (cursor at = {0, 0, 0}; next_uses(f, &at, &count);) {
         if (count == 2 && parity == 0) {
-            join(f->edges, f->uses[0].side, f->uses[1].side);
+            join_pair(f->edges, f->uses[0].side, f->uses[1].side);
         } else if (count > 2 && count % 2 == parity) {
             join_many(f, count);
         } else {
@@ -486,7 +486,7 @@ static bool upwards(const walking *w, uint32_t side) {
 }
 
 /* Numbers and turns all triangles connected to `seed`. */
-static void walk(walking *w, uint32_t seed) {
+static void number_component(walking *w, uint32_t seed) {
     vshi_components *c = w->found;
     const uint32_t number = (uint32_t)c->count++;
     uint8_t *twisted = &c->twisted[number];
@@ -516,7 +516,7 @@ static void walk(walking *w, uint32_t seed) {
     }
 }
 
-static void walk_all(walking *w) {
+static void number_components(walking *w) {
     vshi_components *c = w->found;
     const size_t count = w->mesh->triangle_count;
     for (size_t i = 0; i < count; ++i) {
@@ -524,7 +524,7 @@ static void walk_all(walking *w) {
     }
     for (size_t i = 0; i < count; ++i) {
         if (w->of[i] == NO_COMPONENT && !w->edges.skipped[i]) {
-            walk(w, (uint32_t)i);
+            number_component(w, (uint32_t)i);
         }
     }
     for (size_t i = 0; i < count; ++i) {
@@ -616,7 +616,7 @@ vsh_result vshi_components_find(const vsh_mesh *mesh, size_t index, vshi_compone
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "components", error));
     found->doubled = w.edges.doubled;
     w.edges.doubled = NULL;
-    walk_all(&w);
+    number_components(&w);
     VSHI_TRY_DONE(
         vshi_allocate((void **)&found->begin, found->count + 2, sizeof *found->begin, "components", error));
     vshi_list_groups(w.of, count, (uint32_t)found->count, found->begin, found->list);

@@ -142,7 +142,7 @@ typedef struct measure {
 
 static const vshi_vec LOWEST = {-INFINITY, -INFINITY, -INFINITY}, HIGHEST = {INFINITY, INFINITY, INFINITY};
 
-static void grow(vshi_vec *low, vshi_vec *high, vshi_vec p) {
+static void grow_box(vshi_vec *low, vshi_vec *high, vshi_vec p) {
     *low = (vshi_vec){fmin(low->x, p.x), fmin(low->y, p.y), fmin(low->z, p.z)};
     *high = (vshi_vec){fmax(high->x, p.x), fmax(high->y, p.y), fmax(high->z, p.z)};
 }
@@ -177,7 +177,7 @@ static measure measure_component(const vshi_solidity *s, vshi_component *c) {
         m.doubled_area += found->doubled[i] ? area : 0.0;
         volume += volume_from(corner, origin);
         for (int k = 0; k < 3; ++k) {
-            grow(&c->low, &c->high, corner[k]);
+            grow_box(&c->low, &c->high, corner[k]);
         }
     }
     for (size_t k = 0; k < c->open_edges; ++k) {
@@ -444,8 +444,8 @@ static bool fits_a_dome(const vshi_solidity *s, const vshi_component *dome) {
         const vshi_component *c = &s->components[i];
         if (c != dome) {
             solids = solids && c->kind == VSHI_KIND_SOLID;
-            grow(&low, &high, c->low);
-            grow(&low, &high, c->high);
+            grow_box(&low, &high, c->low);
+            grow_box(&low, &high, c->high);
         }
     }
     return !solids || longest(vshi_sub(high, low)) < DOME_SHARE * longest(vshi_sub(dome->high, dome->low));

@@ -47,7 +47,7 @@ void vshi_source_close(vshi_source *source) {
 }
 
 /* Reads more bytes. The bytes in the buffer may move. */
-static vsh_result fill(vshi_source *s, vsh_error *error) {
+static vsh_result fill_buffer(vshi_source *s, vsh_error *error) {
     if (s->begin > 0 && s->end == s->room) {
         memmove(s->buffer, s->buffer + s->begin, s->end - s->begin);
         s->end -= s->begin;
@@ -96,7 +96,7 @@ vsh_result vshi_source_line(vshi_source *s, const char **line, size_t *size, vsh
             return VSH_OK;
         }
         searched = held;
-        VSHI_TRY(fill(s, error));
+        VSHI_TRY(fill_buffer(s, error));
     }
 }
 
@@ -105,7 +105,7 @@ vsh_result vshi_source_line(vshi_source *s, const char **line, size_t *size, vsh
 static vsh_result peek_bytes(vshi_source *s, size_t size, const char **bytes, size_t *available,
                              vsh_error *error) {
     while (s->end - s->begin < size && !s->ended) {
-        VSHI_TRY(fill(s, error));
+        VSHI_TRY(fill_buffer(s, error));
     }
     *bytes = s->buffer + s->begin;
     *available = s->end - s->begin < size ? s->end - s->begin : size;

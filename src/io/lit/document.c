@@ -213,7 +213,7 @@ void vshi_lit_drop_extension(vshi_lit_work *work, const char *name) {
 /* --- bytes */
 
 /* Appends `more` zeros to the added bytes. */
-static vsh_result grow(vshi_lit_work *work, size_t more, vsh_error *error) {
+static vsh_result grow_added(vshi_lit_work *work, size_t more, vsh_error *error) {
     size_t size;
     if (__builtin_add_overflow(work->added.count, more, &size) || size > SIZE_MAX / 4) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: more bytes than there are addresses", work->gltf.path);
@@ -241,7 +241,7 @@ vsh_result vshi_lit_add_view(vshi_lit_work *work, const void *bytes, size_t size
         return vshi_lit_fail_memory(work, error);
     }
     const size_t at = work->added.count;
-    VSHI_TRY(grow(work, padded / ALIGNMENT * ALIGNMENT, error));
+    VSHI_TRY(grow_added(work, padded / ALIGNMENT * ALIGNMENT, error));
     if (bytes != NULL) {
         memcpy(work->added.list + at, bytes, size);
     }

@@ -272,7 +272,7 @@ static bool are_equal(const vshi_lit_look *a, const vshi_lit_look *b) {
 }
 
 /* Marks an owner with the look at `user`, of its own material. */
-static vsh_result mark(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {
+static vsh_result mark_owner(vshi_lit_work *work, json_t *owner, void *user, vsh_error *error) {
     vshi_lit_look look = *(const vshi_lit_look *)user;
     size_t index = 0;
     VSHI_TRY(
@@ -293,7 +293,7 @@ static vsh_result mark(vshi_lit_work *work, json_t *owner, void *user, vsh_error
 vsh_result vshi_lit_mark_primitive(vshi_lit_work *work, json_t *primitive, uint32_t page, size_t set,
                                    json_t *transform, vsh_error *error) {
     vshi_lit_look look = {.page = page, .set = set, .transform = transform, .made = SIZE_MAX};
-    return visit_primitive(work, primitive, mark, &look, error);
+    return visit_primitive(work, primitive, mark_owner, &look, error);
 }
 
 /* The look of a marked primitive, or NULL. */

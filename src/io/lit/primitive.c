@@ -228,7 +228,7 @@ static vsh_result fail_other(const primitive *p, vsh_error *error) {
 
 /* Finds the model's vertices: the elements that triangles use, in their order. Checks them against the model.
  */
-static vsh_result match(primitive *p, const uint32_t *corners, size_t count, vsh_error *error) {
+static vsh_result match_vertices(primitive *p, const uint32_t *corners, size_t count, vsh_error *error) {
     vshi_gltf *gltf = &p->work->gltf;
     const vsh_mesh mesh = vsh_model_mesh(p->work->model, p->entry, 0);
     if (count != mesh.triangle_count || mesh.vertex_count > p->element_count) {
@@ -264,7 +264,7 @@ static vsh_result find_elements(primitive *p, vsh_error *error) {
     p->draco = vshi_lit_find_draco(p->work, p->mesh, p->index);
     if (p->draco != NULL) { /* Draco's triangles are lists in every mode */
         p->element_count = p->draco->vertex_count;
-        return match(p, p->draco->indices, p->draco->triangle_count, error);
+        return match_vertices(p, p->draco->indices, p->draco->triangle_count, error);
     }
     vshi_gltf_accessor positions;
     VSHI_TRY(vshi_gltf_accessor_find(gltf, json_object_get(p->given, "attributes"), "POSITION", p->where,
@@ -277,7 +277,7 @@ static vsh_result find_elements(primitive *p, vsh_error *error) {
     size_t count = 0;
     vsh_result result =
         vshi_gltf_read_triangles(gltf, p->given, p->mode, positions.count, p->where, &corners, &count, error);
-    result = result == VSH_OK ? match(p, corners, count, error) : result;
+    result = result == VSH_OK ? match_vertices(p, corners, count, error) : result;
     free(corners);
     return result;
 }
@@ -386,9 +386,9 @@ static vsh_result copy_elements(const primitive *p, size_t index, const vshi_glt
 }
 
 /* Finds the copy of an accessor for a split, or makes it. */
-static vsh_result gather(const primitive *p, size_t split, size_t index,
-                         const vshi_lit_draco_attribute *draco, bool bounds, size_t *accessor,
-                         vsh_error *error) {
+static vsh_result copy_accessor(const primitive *p, size_t split, size_t index,
+                                const vshi_lit_draco_attribute *draco, bool bounds, size_t *accessor,
+                                vsh_error *error) {
     vshi_lit_work *work = p->work;
     for (size_t i = 0; i < work->copies.count; ++i) {
         if (work->copies.list[i].split == split && work->copies.list[i].from == index) {
@@ -410,8 +410,8 @@ done:
 }
 
 /* Replaces the accessors in `attributes`, of the primitive or of a morph target. */
-static vsh_result gather_all(const primitive *p, size_t split, json_t *attributes, bool target,
-                             vsh_error *error) {
+static vsh_result copy_accessors(const primitive *p, size_t split, json_t *attributes, bool target,
+                                 vsh_error *error) {
     const char *name;
     json_t *value;
     json_object_foreach(attributes, name, value) {
@@ -419,7 +419,7 @@ static vsh_result gather_all(const primitive *p, size_t split, json_t *attribute
         VSHI_TRY(vshi_gltf_index(&p->work->gltf, attributes, name, "accessors", p->where, &index, error));
         const vshi_lit_draco_attribute *draco =
             p->draco != NULL && !target ? vshi_lit_find_draco_attribute(p->draco, p->given, name) : NULL;
-        VSHI_TRY(gather(p, split, index, draco, strcmp(name, "POSITION") == 0, &accessor, error));
+        VSHI_TRY(copy_accessor(p, split, index, draco, strcmp(name, "POSITION") == 0, &accessor, error));
         vshi_lit_set_number(p->work, attributes, name, accessor);
     }
     return VSH_OK;
@@ -451,9 +451,9 @@ static vsh_result make_split(primitive *p, size_t *uvs, size_t *split, vsh_error
     size_t i;
     json_t *target;
     VSHI_TRY(find_split_alike(p, split, error));
-    VSHI_TRY(gather_all(p, *split, json_object_get(p->made, "attributes"), false, error));
+    VSHI_TRY(copy_accessors(p, *split, json_object_get(p->made, "attributes"), false, error));
     json_array_foreach(json_object_get(p->made, "targets"), i, target) {
-        VSHI_TRY(gather_all(p, *split, target, true, error));
+        VSHI_TRY(copy_accessors(p, *split, target, true, error));
     }
     vshi_lit_remove_extension(p->made, "KHR_draco_mesh_compression");
     return vshi_lit_add_floats(p->work, p->uvs[0], p->lit->vertex_count, 2, false, uvs, error);

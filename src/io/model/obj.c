@@ -238,7 +238,7 @@ static void make_material(const vshi_obj_alpha *from, vshi_model_material *mater
     }
 }
 
-static vsh_result hold(vshi_obj *obj, double bytes, vsh_error *error) {
+static vsh_result hold_bytes(vshi_obj *obj, double bytes, vsh_error *error) {
     obj->budget.bytes += bytes;
     return vshi_check_limit(obj->run, obj->budget.bytes, obj->path, error);
 }
@@ -246,7 +246,7 @@ static vsh_result hold(vshi_obj *obj, double bytes, vsh_error *error) {
 /* Copies the paths of the materials' masks. */
 static vsh_result make_images(vshi_obj *obj, vsh_model *model, vsh_error *error) {
     const size_t count = obj->images.count;
-    VSHI_TRY(hold(obj, (double)count * sizeof *model->images + (double)obj->images.used, error));
+    VSHI_TRY(hold_bytes(obj, (double)count * sizeof *model->images + (double)obj->images.used, error));
     VSHI_TRY(VSHI_ALLOCATE(model->images, count, obj->path, error));
     model->image_count = count;
     for (size_t i = 0; i < count; ++i) {
@@ -262,7 +262,7 @@ static vsh_result make_materials(vshi_obj *obj, vsh_model *model, vsh_error *err
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu materials, at most %d", obj->path, count,
                          INT32_MAX - 1);
     }
-    VSHI_TRY(hold(obj, (double)count * sizeof *model->materials + (double)obj->materials.used, error));
+    VSHI_TRY(hold_bytes(obj, (double)count * sizeof *model->materials + (double)obj->materials.used, error));
     VSHI_TRY(vshi_model_add_materials(model, count, error));
     for (size_t i = 0; i < count; ++i) {
         make_material(&obj->alphas[i], &model->materials[i]);
