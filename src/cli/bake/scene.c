@@ -11,8 +11,7 @@ static int check_heights(const cli_bake_settings *s) {
     static const char *const needs[] = {"--height H, the height of white",
                                         "--size-world W, the length of its longer side"};
     const bool height = s->height != 0.0, world = s->world[0] > 0.0;
-    const bool image =
-        cli_has_ending(s->input, "png exr tif tiff pgm ppm pfm hdr jpg jpeg bmp tga jp2 webp");
+    const bool image = cli_has_ending(s->input, "png exr tif tiff pgm ppm pfm hdr jpg jpeg bmp tga jp2 webp");
     CLI_REFUSE_IF(cli_was_given("height") && !height, "--height '0': a terrain without height casts nothing");
     CLI_REFUSE_IF(!image && (height || world), "--%s: %s is no image of heights",
                   height ? "height" : "size-world", s->input);

@@ -223,7 +223,7 @@ vsh_result vshi_lit_bring_images(vshi_lit_work *work, vsh_error *error) {
     free(from);
     free(to);
     const json_t *images = json_object_get(work->gltf.root, "images");
-    const size_t own = json_array_size(images) - work->options->image_count; /* those of the bake follow */
+    const size_t own = json_array_size(images) - work->options->image_count; /* the bake's images follow */
     json_array_foreach(moves ? images : NULL, i, image) {
         const char *uri = json_string_value(json_object_get(image, "uri"));
         if (i < own && uri != NULL && !vshi_uri_is_data(uri) && !vshi_uri_is_remote(uri)) {

@@ -75,7 +75,7 @@ static void refer_primitive(pruning *p, json_t *primitive) {
     }
 }
 
-/* References of what always stays. */
+/* References of meshes, nodes, skins, animations and materials, which all stay. */
 static void refer_roots(pruning *p) {
     size_t i, k;
     json_t *item, *inner, *root = p->work->gltf.root;
@@ -181,7 +181,7 @@ static void keep_textures(pruning *p) {
         const bool marked = json_object_get(json_object_get(texture, "extras"), texture_key) != NULL;
         shown[i] = !(shown[i] || i >= own || !marked);
     }
-    refer_items(p, TEXTURES); /* of those that go */
+    refer_items(p, TEXTURES); /* of textures that go */
     for (int kind = TEXTURES; kind < KINDS; ++kind) {
         for (i = 0; i < p->count[kind]; ++i) {
             p->kept[kind][i] = !p->kept[kind][i];

@@ -36,7 +36,7 @@ typedef struct vshi_material {
 /* Number of materials: 0 for PLY. Formats other than glTF and OBJ give names and `alpha` alone. */
 size_t vshi_model_material_count(const vsh_model *model);
 
-/* Material `index` (< material count). What it points to belongs to the model. */
+/* Material `index` (< material count). The model owns its name and image. */
 vshi_material vshi_model_get_material(const vsh_model *model, size_t index);
 
 /* The material of mesh `index` (< mesh count); -1: none. */
