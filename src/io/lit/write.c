@@ -316,6 +316,11 @@ static vsh_result join_buffers(writing *w, vsh_error *error) {
     if (one != NULL) {
         vshi_lit_push(work, list, one);
     }
+    if (work->refused) { /* the list may not hold the buffer */
+        json_decref(list);
+        free(numbers);
+        return vshi_lit_fail_memory(work, error);
+    }
     for (size_t i = 0; i < w->part_count; ++i) {
         move_part(w, w->parts[i], numbers, list);
     }
