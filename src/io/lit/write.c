@@ -398,18 +398,30 @@ static vsh_result write_chunks(const writing *w, const char *json, size_t json_s
     return VSH_OK;
 }
 
-/* Writes the JSON, with lines and indents, or a GLB. */
+/* A json_dump_callback_t. The stream keeps failures: json_dumps() of Jansson 2.14 drops keys without memory.
+ */
+static int write_text(const char *text, size_t size, void *user) {
+    fwrite(text, 1, size, user);
+    return 0;
+}
+
+/* Writes the JSON, with lines and indents, or a GLB with the JSON first, whose size precedes it. */
 static vsh_result write_document(const writing *w, bool binary, FILE *to, vsh_error *error) {
-    char *json = json_dumps(w->work->gltf.root, binary ? JSON_COMPACT : JSON_INDENT(2));
-    if (json == NULL) {
+    char *json = NULL;
+    size_t size = 0;
+    FILE *text = binary ? open_memstream(&json, &size) : to;
+    if (text == NULL) {
         return vshi_lit_fail_memory(w->work, error);
     }
-    vsh_result result = VSH_OK;
-    if (binary) {
-        result = write_chunks(w, json, strlen(json), to, error);
-    } else {
-        fprintf(to, "%s\n", json);
+    bool failed =
+        json_dump_callback(w->work->gltf.root, write_text, text, binary ? JSON_COMPACT : JSON_INDENT(2)) != 0;
+    if (!binary) {
+        fputc('\n', to);
+        return failed ? vshi_lit_fail_memory(w->work, error) : VSH_OK;
     }
+    failed = failed || ferror(text) != 0;
+    const vsh_result result = fclose(text) != 0 || failed ? vshi_lit_fail_memory(w->work, error)
+                                                          : write_chunks(w, json, size, to, error);
     free(json);
     return result;
 }
