@@ -312,8 +312,9 @@ static vsh_result join_buffers(writing *w, vsh_error *error) {
         one = has_bytes(work, b) ? json_incref(json_array_get(json_object_get(gltf->root, "buffers"), b))
                                  : NULL;
     }
-    one = one == NULL && w->size > 0 ? json_object() : one;
-    if (one != NULL) {
+    const bool any = one != NULL || w->size > 0;
+    if (any) {
+        one = one != NULL ? one : json_object();
         vshi_lit_push(work, list, one);
     }
     if (work->refused) { /* the list may not hold the buffer */
@@ -325,7 +326,7 @@ static vsh_result join_buffers(writing *w, vsh_error *error) {
         move_part(w, w->parts[i], numbers, list);
     }
     free(numbers);
-    if (one != NULL) {
+    if (any) {
         vshi_lit_set_number(work, one, "byteLength", w->size);
         json_object_del(one, "uri");
     }
