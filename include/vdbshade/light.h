@@ -30,8 +30,9 @@ enum {
 };
 
 /* A light. Shadow values depend on its shape and place alone; falloff, colour, a spot's edge and cosines
- * enter irradiance. A size (angle, radius) of 0 is a hard light, and so is a half angle whose sine is below
- * 1e-6. Numbers are finite. Members that the type does not name are ignored.
+ * enter irradiance. But points beyond the reach of VSH_FALLOFF_QUADRATIC, or outside a spot's outer cone, get
+ * no light: their shadow value is 0, and costs no ray. A size (angle, radius) of 0 is a hard light, and so is
+ * a half angle whose sine is below 1e-6. Numbers are finite. Members that the type does not name are ignored.
  *
  * The visible fraction of a rectangle is that of its solid angle. VSH_SHADOW_RAYS, ADAPTIVE and EXACT cast
  * rays over the rectangle, and VSH_SHADOW_HARD to its centre. Other methods, and heights and spheres without
@@ -222,7 +223,7 @@ typedef struct vsh_shade_stats {
     size_t struct_size;
     uint64_t marches;       /* cones and rays that were marched */
     uint64_t samples;       /* samples of the field */
-    uint64_t skipped;       /* points that face away from the light */
+    uint64_t skipped;       /* points that face away from the light, or lie beyond its reach or cone */
     uint64_t certified;     /* cones that proved full light or full shadow, within the field's error */
     uint64_t unfinished;    /* marches that ran out of steps, which keep the value reached by then */
     uint64_t invalid;       /* points whose position or normal is not finite, or zero normals: NaN */
@@ -243,11 +244,12 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
 /* --- shading */
 
 /* Writes the fraction of the light that each point sees, 0 dark … 1 lit, to visibility[count]: before cosine,
- * colour and falloff (a spot's edge is falloff). Points that face away from the light get 0, points inside it
- * 1, invalid ones NaN. `deviation` [count] (may be NULL) receives the standard error left: 0 if a cone proved
- * the value, an estimate if rays gave it, NaN if the method knows none. Uses up to 512 KB of each thread's
- * stack, the caller's too. Errors (the arrays are then undefined): VSH_ERROR_ARGUMENT (options out of range,
- * exact without triangles, run, and as vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * colour and falloff (a spot's edge is falloff). Points that face away from the light, or lie beyond its
+ * reach or cone, get 0, points inside it 1, invalid ones NaN. `deviation` [count] (may be NULL) receives the
+ * standard error left: 0 if a cone proved the value, an estimate if rays gave it, NaN if the method knows
+ * none. Uses up to 512 KB of each thread's stack, the caller's too. Errors (the arrays are then undefined):
+ * VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run, and as vsh_light_check()),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
                                     const vsh_light *light, const vsh_shade_options *options,
                                     const vsh_run *run, float *visibility, float *deviation,

@@ -260,7 +260,34 @@ vsh_light vshi_light_resized(const vsh_light *light, double factor) {
 vshi_light_place vshi_light_in_world(const vsh_light *light) {
     vshi_light_place place;
     types[light->type].place(light, &place);
+    place.reach = light->falloff == VSH_FALLOFF_QUADRATIC ? light->reach : INFINITY;
+    place.outer = INFINITY;
+    place.rim = -INFINITY;
+    if (light->type == VSH_LIGHT_SPOT) {
+        place.beam = vshi_unit(vshi_vec_of(light->axis));
+        place.outer = light->outer_angle;
+        place.rim = vshi_cos(light->outer_angle);
+    }
     return place;
+}
+
+vshi_light_part vshi_light_covers(const vshi_light_place *place, vshi_vec centre, double radius) {
+    static const double ROOM = 1.0 + 1e-6; /* proofs use larger balls by this factor, against rounding */
+    if (place->parallel) {
+        return VSHI_LIGHT_ALL;
+    }
+    vshi_vec to;
+    const double distance = vshi_light_towards(place, centre, &to), cosine = -vshi_dot(place->beam, to);
+    if (radius <= 0.0) {
+        return distance < place->reach && cosine >= place->rim ? VSHI_LIGHT_ALL : VSHI_LIGHT_NO_PART;
+    }
+    const double wide = ROOM * radius, angle = vshi_acos(fmin(fmax(cosine, -1.0), 1.0)),
+                 half = wide < distance ? ROOM * (0.5 * PI - vshi_acos(wide / distance)) : PI;
+    if (distance - wide >= place->reach || angle - half > place->outer) {
+        return VSHI_LIGHT_NO_PART;
+    }
+    return distance + wide < place->reach && angle + half < place->outer ? VSHI_LIGHT_ALL
+                                                                         : VSHI_LIGHT_SOME_PART;
 }
 
 vshi_light_place vshi_light_moved(const vshi_light_place *place, const double matrix[12], double unit) {
@@ -268,6 +295,8 @@ vshi_light_place vshi_light_moved(const vshi_light_place *place, const double ma
     moved.towards = vshi_unit(vshi_transform_vector(matrix, place->towards));
     moved.centre = vshi_transform_point(matrix, place->centre);
     moved.radius = place->radius / unit;
+    moved.reach = place->reach / unit;
+    moved.beam = vshi_unit(vshi_transform_vector(matrix, place->beam));
     if (place->is_rectangle) {
         vshi_rectangle_move(&moved, matrix, unit);
     }

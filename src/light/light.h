@@ -32,6 +32,10 @@ typedef struct vshi_light_place {
     double tangent;   /* of the half angle */
     vshi_vec centre;  /* not directional */
     double radius;    /* of the sphere around the whole light; 0 for directional lights */
+    double reach;     /* of a quadratic falloff; else infinite */
+    vshi_vec beam;    /* spot: unit, the way it shines */
+    double outer;     /* spot: half angle of its cone; else infinite */
+    double rim;       /* its cosine; else -infinite */
     bool is_rectangle;
     vshi_vec x, y, normal;          /* rectangle: unit, along its sides, and the way it shines */
     double half_width, half_height; /* rectangle: half of its sides */
@@ -43,6 +47,16 @@ vshi_light_place vshi_light_in_world(const vsh_light *light);
 
 /* The place after a transform that turns, and scales evenly by 1 / unit. */
 vshi_light_place vshi_light_moved(const vshi_light_place *place, const double matrix[12], double unit);
+
+/* The part of a ball, in the place's space, that is within the light's reach and cone. A ball without radius
+ * is all or none of it, and none where the light's gain is 0 (vshi_light_gain()). */
+typedef enum vshi_light_part { VSHI_LIGHT_NO_PART, VSHI_LIGHT_SOME_PART, VSHI_LIGHT_ALL } vshi_light_part;
+vshi_light_part vshi_light_covers(const vshi_light_place *place, vshi_vec centre, double radius);
+
+/* Whether a point is within the light's reach and cone. */
+static inline bool vshi_light_lights(const vshi_light_place *place, vshi_vec at) {
+    return vshi_light_covers(place, at, 0.0) == VSHI_LIGHT_ALL;
+}
 
 /* --- a light as a point sees it */
 

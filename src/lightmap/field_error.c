@@ -138,13 +138,18 @@ static void add(double weight, double square, vsh_bake_error *sum) {
 }
 
 void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
-                          const vshi_held_sample *held, size_t count, const float *values,
-                          vsh_bake_error *sum) {
+                          const double *places, const vshi_held_sample *held, size_t count,
+                          const float *values, vsh_bake_error *sum) {
     for (size_t k = 0; k < count; ++k) {
         const size_t i = held[k].sample;
         const double value = (double)values[held[k].origin];
-        const float *face = channel->truth.light == NULL ? samples->geometric + 3 * i : NULL;
+        const vsh_light *light = channel->truth.light;
+        const float *face = light == NULL ? samples->geometric + 3 * i : NULL;
         double position[3], seen[2];
+        if (light != NULL &&
+            !vshi_light_lights(&channel->truth.place, vshi_vec_of(places + 3 * (size_t)held[k].origin))) {
+            continue; /* 0 without error */
+        }
         place(channel, samples, i, position);
         if (!isnan(value) && vshi_truth_twice(&channel->truth, position, samples->normal + 3 * i, face,
                                               samples->texel[i], value, seen)) {

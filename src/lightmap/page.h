@@ -186,10 +186,11 @@ typedef struct vshi_held_sample {
 size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *samples,
                                const vshi_origins *origins, vshi_held_sample *held);
 
-/* Adds the errors of a channel's values [origins]. */
+/* Adds the errors of a channel's values [origins], but for origins at `places` [origins][3] that the light
+ * does not reach. */
 void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
-                          const vshi_held_sample *held, size_t count, const float *values,
-                          vsh_bake_error *sum);
+                          const double *places, const vshi_held_sample *held, size_t count,
+                          const float *values, vsh_bake_error *sum);
 
 /* Counts the free rays of a channel; returns the number of texels. */
 size_t vshi_field_error_count(const vshi_truth_channel *channel, const vshi_samples *samples,

@@ -96,8 +96,8 @@ static void smooth_along(const smoothing *s, bool down, const float *from, float
     }
 }
 
-/* Lays out the samples. False if two share a texel, or none has noise. */
-static bool lay_out_samples(smoothing *s) {
+/* Lays out the samples that the light reaches. False if two share a texel, or none has noise. */
+static bool lay_out_samples(const vshi_light_place *light, smoothing *s) {
     bool open = false;
     memset(s->sample, 0xff, sizeof s->sample);
     for (size_t i = 0; i < s->origins->count; ++i) {
@@ -106,16 +106,20 @@ static bool lay_out_samples(smoothing *s) {
         if (*at != NONE) {
             return false;
         }
+        if (!vshi_light_lights(light, vshi_vec_of(s->origins->position + 3 * i))) {
+            continue;
+        }
         *at = (uint16_t)i;
         open = open || s->deviation[i] > 0.0f;
     }
     return open;
 }
 
-static void smooth_shadow(const vshi_origins *origins, float *values, const float *deviation, smoothing *s) {
+static void smooth_shadow(const vshi_light_place *light, const vshi_origins *origins, float *values,
+                          const float *deviation, smoothing *s) {
     s->origins = origins;
     s->deviation = deviation;
-    if (origins->count > SIDE * SIDE || !lay_out_samples(s)) {
+    if (origins->count > SIDE * SIDE || !lay_out_samples(light, s)) {
         return;
     }
     smooth_along(s, false, values, s->across);
@@ -295,6 +299,8 @@ enum { AROUND = VSHI_TILE + 2, FRAME = 4 * (VSHI_TILE + 1) };
 typedef struct work {
     vshi_samples samples;
     vshi_origins origins;
+    vshi_vec centre; /* of the ball around the origins' positions */
+    double radius;
     size_t own; /* samples of the tile; the frame's follow */
     float *values, *deviation;
     float *vectors;    /* [room][3]: bent normals, or tint */
@@ -440,15 +446,16 @@ static channel begin_channel(const tracing *t, size_t tile, size_t index) {
     return c;
 }
 
-/* Adds a channel's errors to its sums, with those of samples that are compared with the casters. */
-static void end_channel(const tracing *t, const work *w, const channel *c, size_t index) {
+/* Adds a channel's errors to its sums, with those of samples that are compared with the casters. `lit`
+ * origins may have an error. */
+static void end_channel(const tracing *t, const work *w, const channel *c, size_t index, size_t lit) {
     if (keeps_error(&t->tracer->shade, index < t->tracer->light_count)) {
-        c->sum->values += (double)w->origins.count;
+        c->sum->values += (double)lit;
         c->sum->square_error += c->stats->square_error - c->square;
         c->sum->worst = fmax(c->sum->worst, c->stats->worst_error);
         if (t->checking.channels != NULL) {
-            vshi_field_error_add(&t->checking.channels[index], &w->samples, w->held, w->held_count, w->values,
-                                 c->sum);
+            vshi_field_error_add(&t->checking.channels[index], &w->samples, w->origins.position, w->held,
+                                 w->held_count, w->values, c->sum);
         }
     }
     c->stats->worst_error = fmax(c->worst, c->stats->worst_error);
@@ -458,17 +465,44 @@ static float *plane_of(float *const *planes, size_t light) {
     return planes != NULL ? planes[light] : NULL;
 }
 
+/* Sets the ball around the origins' positions. */
+static void find_ball(work *w) {
+    const vshi_origins *origins = &w->origins;
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    for (size_t k = 0; k < origins->count; ++k) {
+        vshi_grow_box(low, high, vshi_vec_of(origins->position + 3 * k));
+    }
+    w->centre = vshi_scale(vshi_add(vshi_vec_of(low), vshi_vec_of(high)), 0.5);
+    w->radius = vshi_length(vshi_sub(vshi_vec_of(high), w->centre));
+}
+
+/* Counts the origins within a light's reach and cone. */
+static size_t count_lit(const work *w, const vshi_light_place *place) {
+    const vshi_light_part part = vshi_light_covers(place, w->centre, w->radius);
+    size_t lit = part == VSHI_LIGHT_ALL ? w->origins.count : 0;
+    for (size_t k = 0; part == VSHI_LIGHT_SOME_PART && k < w->origins.count; ++k) {
+        lit += vshi_light_lights(place, vshi_vec_of(w->origins.position + 3 * k));
+    }
+    return lit;
+}
+
 static void trace_light(const tracing *t, work *w, size_t tile, size_t index) {
     const vshi_tracer *tracer = t->tracer;
     const vsh_lightmap *planes = &t->page->lightmap;
     float *shadow = plane_of(planes->shadow, index), *errors = plane_of(planes->shadow_error, index),
           *tint = plane_of(planes->tint, index);
     const vsh_light *light = &tracer->lights[index];
+    const size_t lit = count_lit(w, &tracer->shadow[index].world);
+    if (lit == 0) { /* the planes are 0 already */
+        t->page->stats[tile].skipped += w->origins.count;
+        return;
+    }
     const vsh_points points = place_points(t, w, light, tracer->traces_shadow);
     const channel c = begin_channel(t, tile, index);
-    vshi_shadow_points(&tracer->shadow[index], &points, w->values, w->deviation, c.stats);
+    vshi_shadow_points(&tracer->shadow[index], &points, w->origins.position, w->values, w->deviation,
+                       c.stats);
     if (tracer->shade.max_error >= VSHI_COARSE) { /* finer values are smooth by themselves */
-        smooth_shadow(&w->origins, w->values, w->deviation, &w->smooth);
+        smooth_shadow(&tracer->shadow[index].world, &w->origins, w->values, w->deviation, &w->smooth);
     }
     if (errors != NULL) {
         average(t, w, w->deviation, 1, true, errors);
@@ -476,7 +510,7 @@ static void trace_light(const tracing *t, work *w, size_t tile, size_t index) {
     if (shadow != NULL) {
         average(t, w, w->values, 1, false, shadow);
     }
-    end_channel(t, w, &c, index);
+    end_channel(t, w, &c, index, lit);
     if (tint != NULL) {
         vshi_shade_tint(w->origins.count, w->values, &planes->tint_by, w->vectors);
         average(t, w, w->vectors, 3, false, tint);
@@ -530,7 +564,7 @@ static void trace_ao(const tracing *t, work *w, size_t tile, bool sky) {
     if (!sky && planes->ao != NULL) {
         average(t, w, w->values, 1, false, planes->ao);
     }
-    end_channel(t, w, &c, tracer->light_count + sky);
+    end_channel(t, w, &c, tracer->light_count + sky, w->origins.count);
     if (bent) {
         store_bent(t, w);
     }
@@ -631,6 +665,7 @@ static vsh_result trace_samples(const tracing *t, work *w, size_t tile, vsh_erro
         own.count = w->own;
         w->held_count = vshi_field_error_choose(&t->checking, &own, &w->origins, w->held);
     }
+    find_ball(w);
     if (planes->irradiance != NULL) {
         memset(w->irradiance, 0, 3 * w->origins.count * sizeof *w->irradiance);
     }

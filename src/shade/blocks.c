@@ -327,8 +327,9 @@ void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const v
     const bool parallel = task->place.parallel;
     for (size_t i = 0; i < count; ++i) {
         vshi_cone beam;
-        proof[i] = VSHI_UNPROVED;
-        if (aim_ball(task, centre[i], radius[i], &beam) &&
+        const vshi_light_part part = vshi_light_covers(&task->place, centre[i], radius[i]);
+        proof[i] = part == VSHI_LIGHT_NO_PART ? VSHI_PROVED_FULL : VSHI_UNPROVED;
+        if (part == VSHI_LIGHT_ALL && aim_ball(task, centre[i], radius[i], &beam) &&
             !vshi_chunk_add(&chunk, task->field, &beam, (uint32_t)i, stats)) {
             proof[i] = VSHI_PROVED_FREE;
         }

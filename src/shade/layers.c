@@ -178,11 +178,12 @@ static void combine(int32_t how, double share, double deviation, double above, f
 
 /* Shades by the layer's field. Values of the whole light become shares of the light above the horizon, which
  * every layer's value contains. */
-static void shade_field(const prepared *item, const vshi_shadow_task *task, layer_piece *piece,
+static void shade_field(const prepared *item, const vshi_shadow_task *task, size_t begin, layer_piece *piece,
                         vsh_shade_stats *stats) {
     vshi_shadow_task own = item->shadow;
     own.kernel = task->kernel;
     own.points = &piece->points;
+    own.places = task->places != NULL ? task->places + 3 * begin : NULL;
     own.visibility = piece->value;
     own.deviation = task->deviation != NULL ? piece->deviation : NULL;
     vshi_shadow_shade(&own, 0, piece->points.count, stats);
@@ -225,7 +226,7 @@ void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task,
         if (vshi_layer_is_closed(&item->layer)) {
             shade_closed(item, task, begin, &piece, stats);
         } else {
-            shade_field(item, task, &piece, stats);
+            shade_field(item, task, begin, &piece, stats);
         }
         for (size_t i = begin, n = 0; i < end; ++i, ++n) {
             if (!(task->visibility[i] > 0.0f)) {

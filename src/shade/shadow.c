@@ -62,7 +62,8 @@ void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, 
             ++stats->invalid;
             continue;
         }
-        const vshi_light_side side = aim(task, i, origin, cone);
+        const vshi_light_side side =
+            vshi_shadow_reaches(task, i) ? aim(task, i, origin, cone) : VSHI_LIGHT_AWAY;
         if (side != VSHI_LIGHT_SEEN) {
             vshi_shadow_settle(task, i, side == VSHI_LIGHT_WITHIN ? 1.0f : 0.0f, 0.0f);
             stats->skipped += side == VSHI_LIGHT_AWAY;
@@ -212,10 +213,11 @@ vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *lig
     return result;
 }
 
-void vshi_shadow_points(const vshi_shadow_task *prepared, const vsh_points *points, float *visibility,
-                        float *deviation, vsh_shade_stats *stats) {
+void vshi_shadow_points(const vshi_shadow_task *prepared, const vsh_points *points, const double *places,
+                        float *visibility, float *deviation, vsh_shade_stats *stats) {
     vshi_shadow_task task = *prepared;
     task.points = points;
+    task.places = places;
     task.visibility = visibility;
     task.deviation = deviation;
     for (size_t begin = 0; begin < points->count; begin += VSHI_PIECE) {

@@ -23,7 +23,9 @@ typedef struct vshi_shadow_task {
     uint32_t purpose; /* of the sampler: lights of other names have other sequences */
     const vshi_kernel *kernel;
     const vsh_points *points;
-    bool scattered; /* the points' texels are only numbers: points share no rays */
+    const double *places; /* [points][3]: whether the light reaches a point is decided here, world units;
+                             NULL: at the points */
+    bool scattered;       /* the points' texels are only numbers: points share no rays */
     float *visibility;
     float *deviation; /* or NULL */
 } vshi_shadow_task;
@@ -50,6 +52,12 @@ int32_t vshi_shadow_most_rays(const vsh_shade_options *options);
  * normals. */
 double vshi_shadow_above(const vshi_shadow_task *task, size_t i);
 
+/* Whether point i is within the light's reach and cone. */
+static inline bool vshi_shadow_reaches(const vshi_shadow_task *task, size_t i) {
+    const double *places = task->places != NULL ? task->places : task->points->positions;
+    return vshi_light_lights(&task->world, vshi_vec_of(places + 3 * i));
+}
+
 /* A vshi_shade_fn of a vshi_shadow_task, for at most VSHI_PIECE points. */
 vshi_shade_fn vshi_shadow_shade;
 
@@ -61,9 +69,9 @@ vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *lig
 void vshi_shadow_close(vshi_shadow_task *task);
 
 /* Shades points on the calling thread. Values depend only on the points and their order. Thread safe.
- * `deviation` may be NULL. */
-void vshi_shadow_points(const vshi_shadow_task *prepared, const vsh_points *points, float *visibility,
-                        float *deviation, vsh_shade_stats *stats);
+ * `places` is as in the task; `deviation` may be NULL. */
+void vshi_shadow_points(const vshi_shadow_task *prepared, const vsh_points *points, const double *places,
+                        float *visibility, float *deviation, vsh_shade_stats *stats);
 
 enum { VSHI_PIECE = 512 }; /* points: with their rays 300 KB of the stack */
 
@@ -78,8 +86,8 @@ typedef struct vshi_facing {
     bool gathered[VSHI_PIECE];   /* its block was marched, and not proved: it is likely to be in a penumbra */
 } vshi_facing;
 
-/* Gathers points begin … end - 1, at most VSHI_PIECE. Settles invalid points, points within the light, and
- * points that face away. Proves blocks of the others. */
+/* Gathers points begin … end - 1, at most VSHI_PIECE. Settles invalid points, points within the light, points
+ * that face away, and points beyond its reach or cone. Proves blocks of the others. */
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
                         vshi_chunk *chunk, vsh_shade_stats *stats);
 
@@ -104,8 +112,8 @@ void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_c
                        vsh_shade_stats *stats);
 
 /* Proves `count` balls of free space, at most VSHI_CHUNK: VSHI_PROVED_FREE if all points of a ball see the
- * whole light, VSHI_PROVED_FULL if no point sees any of it, else VSHI_UNPROVED. Centres and radii are finest
- * voxels, in field space. */
+ * whole light, VSHI_PROVED_FULL if no point sees any of it or the light reaches none, else VSHI_UNPROVED.
+ * Centres and radii are finest voxels, in field space. */
 void vshi_blocks_prove_balls(const vshi_shadow_task *task, size_t count, const vshi_vec *centre,
                              const double *radius, int8_t *proof, vsh_shade_stats *stats);
 

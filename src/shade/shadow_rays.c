@@ -391,8 +391,9 @@ static size_t cast_shared(ray_batch *batch, size_t begin, size_t end, size_t *so
     for (size_t k = 0; k < interp.count; ++k) {
         interp.value[k] = task->visibility[begin + k];
         interp.deviation[k] = 0.0f;
-        interp.state[k] =
-            (uint8_t)(isnan(interp.value[k]) ? VSHI_INTERPOLATION_GONE : VSHI_INTERPOLATION_KNOWN);
+        interp.state[k] = (uint8_t)(isnan(interp.value[k]) || !vshi_shadow_reaches(task, begin + k)
+                                        ? VSHI_INTERPOLATION_GONE
+                                        : VSHI_INTERPOLATION_KNOWN);
     }
     cast_all(batch, some, batch->open_count, interp.rays, false);
     for (size_t o = 0; o < batch->open_count; ++o) {

@@ -361,3 +361,110 @@ TEST(bad_channels_are_refused_with_the_reason) {
         assert_fails(bake(field, &cases[i].ask, b), VSH_ERROR_ARGUMENT, cases[i].message);
     }
 }
+
+/* --- the ends of lights */
+
+enum { LENGTH = 64, FINE = 128, FINE_TEXELS = FINE * FINE };
+
+static vsh_light fading_lamp(double x, double height, double z, double reach) {
+    vsh_light light = lamp((const double[]){x, height, z}, 0.05);
+    light.falloff = VSH_FALLOFF_QUADRATIC;
+    light.reach = reach;
+    return light;
+}
+
+static vsh_light narrow_spot(void) {
+    vsh_light light = lamp((const double[]){0.0, 0.5, 0.0}, 0.05);
+    light.type = VSH_LIGHT_SPOT;
+    memcpy(light.axis, (const double[]){0.0, -2.0, 0.0}, sizeof light.axis);
+    light.inner_angle = RADIANS(10.0);
+    light.outer_angle = RADIANS(30.0);
+    return light;
+}
+
+TEST(a_light_shades_the_points_within_its_reach_and_cone_alone) {
+    static const int32_t methods[] = {VSH_SHADOW_HARD, VSH_SHADOW_CONE, VSH_SHADOW_RAYS, VSH_SHADOW_ADAPTIVE};
+    OWNED(vsh_field) *field = floor_field(false);
+    vsh_light panel = fading_lamp(0.0, 0.5, 0.0, 0.8);
+    panel.type = VSH_LIGHT_RECTANGLE;
+    memcpy(panel.edge_u, (const double[]){0.0, 0.0, 0.1}, sizeof panel.edge_u);
+    memcpy(panel.edge_v, (const double[]){0.1, 0.0, 0.0}, sizeof panel.edge_v);
+    panel.two_sided = 1;
+    const struct {
+        vsh_light light;
+        double border; /* on the floor */
+    } cases[] = {{fading_lamp(0.0, 0.5, 0.0, 0.8), sqrt(0.8 * 0.8 - 0.25)},
+                 {panel, sqrt(0.8 * 0.8 - 0.25)},
+                 {narrow_spot(), 0.5 * tan(RADIANS(30.0))}};
+    for (size_t k = 0; k < COUNT_OF(cases) * COUNT_OF(methods); ++k) {
+        const vsh_light *light = &cases[k / COUNT_OF(methods)].light;
+        const double border = cases[k / COUNT_OF(methods)].border;
+        double positions[LENGTH][3] = {{0.0}};
+        float normals[LENGTH][3], visible[LENGTH], deviation[LENGTH];
+        for (int i = 0; i < LENGTH; ++i) { /* the last but one and the last pair at the border */
+            positions[i][0] =
+                i < LENGTH - 2 ? i / 60.0 : border * (i == LENGTH - 2 ? 1.0 - 1e-9 : 1.0 + 1e-9);
+            memcpy(normals[i], UP, sizeof UP);
+        }
+        vsh_shade_options options = preview_options();
+        options.method = methods[k % COUNT_OF(methods)];
+        const vsh_points points = {LENGTH, positions[0], normals[0], NULL};
+        const vsh_shade_stats stats =
+            shade_points(occluders_of(field), &points, light, &options, NULL, visible, deviation);
+        uint64_t beyond = 0;
+        for (int i = 0; i < LENGTH; ++i) {
+            const bool lit = positions[i][0] < border;
+            float rgb[3] = {0.0f};
+            const vsh_points one = {1, positions[i], UP, NULL};
+            vsh_shade_irradiance(&one, NULL, light, (const float[]){1.0f}, rgb);
+            assert_true(lit ? visible[i] > 0.9f : visible[i] == 0.0f);
+            assert_true(lit || rgb[0] == 0.0f);
+            beyond += !lit;
+        }
+        assert_int_equal(stats.skipped, beyond);
+        if (options.method == VSH_SHADOW_RAYS) {
+            assert_int_equal(stats.rays, options.rays * (int)(LENGTH - beyond));
+        }
+        const vsh_points last = {1, positions[LENGTH - 1], normals[0], NULL};
+        const vsh_shade_stats none =
+            shade_points(occluders_of(field), &last, light, &options, NULL, visible, deviation);
+        assert_true(none.rays == 0 && none.marches == 0 && none.samples == 0);
+    }
+}
+
+/* Of four tiles the light reaches a part of one. */
+TEST(texels_beyond_the_reach_cost_no_ray_and_do_not_dilute_the_error) {
+    const vsh_mesh mesh = quad_of_arrays("floor", CORNERS, UVS);
+    OWNED(vshi_triangles) *triangles = triangles_from(&mesh, 1);
+    OWNED(vsh_occluders) *occluders = occluders_from_triangles(triangles);
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = FINE;
+    options.shade.start_offset = 0.0; /* texels lie on the floor */
+    OWNED(vsh_charts) *charts = charts_from(&mesh, 1, &options);
+    static float shadow[FINE_TEXELS], irradiance[3 * FINE_TEXELS], coverage[FINE_TEXELS];
+    float *planes[1] = {shadow};
+    const vsh_lightmap lightmap = {.shadow = planes, .irradiance = irradiance, .coverage = coverage};
+    vsh_bake_error errors[2];
+    for (int far = 0; far < 2; ++far) {
+        const vsh_light light = fading_lamp(-0.5, far ? 0.5 : 0.3, -0.5, 0.45);
+        vsh_bake_stats stats = vsh_bake_stats_zero();
+        stats.errors = errors;
+        memset(errors, 0, sizeof errors);
+        assert_ok(vsh_bake_lightmap(occluders, charts, &light, 1, NULL, NULL, &lightmap, &stats, &failure));
+        size_t lit = 0;
+        for (size_t i = 0; i < FINE_TEXELS; ++i) {
+            const double x = (2.0 * (double)(i % FINE) + 1.0) / FINE - 1.0;
+            const double z = (2.0 * (double)(i / FINE) + 1.0) / FINE - 1.0;
+            const double height = light.position[1];
+            const double d = sqrt((x + 0.5) * (x + 0.5) + (z + 0.5) * (z + 0.5) + height * height);
+            const double left = fmax(0.0, 1.0 - d / light.reach);
+            assert_true(shadow[i] == (d < light.reach ? 1.0f : 0.0f) && coverage[i] == 1.0f);
+            assert_float_equal(irradiance[3 * i], left * left * height / d, 1e-5);
+            lit += d < light.reach;
+        }
+        assert_true(far ? lit == 0 : lit > 100);
+        assert_true(errors[0].values == (double)lit && errors[0].held <= (double)lit);
+        assert_int_equal(stats.shade.skipped, FINE_TEXELS - lit);
+        assert_true(far ? stats.shade.rays == 0 : stats.shade.rays > 0);
+    }
+}

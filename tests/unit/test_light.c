@@ -1,4 +1,6 @@
 /* vsh_light_check() and names of constants. */
+#include "fields.h"
+#include "light/light.h"
 #include "testing.h"
 
 static vsh_light sun(void) {
@@ -239,4 +241,41 @@ TEST(every_constant_has_its_name_and_every_name_its_constant) {
         assert_null(vsh_get_name(kind, 0));
         assert_int_equal(vsh_find_name(kind, "none"), -1);
     }
+}
+
+/* Against points spread over the ball. */
+TEST(a_ball_that_a_light_covers_has_covered_points_alone) {
+    enum { BALLS = 3000, POINTS = 200 };
+    uint64_t counter = 1;
+    size_t parts[3] = {0};
+    for (int ball = 0; ball < BALLS; ++ball) {
+        vsh_light light = ball % 2 != 0 ? spot() : lamp();
+        light.falloff = ball % 3 != 0 ? VSH_FALLOFF_QUADRATIC : VSH_FALLOFF_NONE;
+        light.reach = between(&counter, 0.5, 3.0);
+        light.inner_angle = 0.1;
+        light.outer_angle = between(&counter, 0.1, 3.1);
+        double matrix[12] = {0.0, 2.0, 0.0, 1.0, -2.0, 0.0, 0.0, 3.0, 0.0, 0.0, 2.0, -5.0};
+        const vshi_light_place world = vshi_light_in_world(&light);
+        const vshi_light_place moved = vshi_light_moved(&world, matrix, 0.5);
+        const vshi_vec centre = {between(&counter, -2.0, 2.0), between(&counter, -2.0, 2.0),
+                                 between(&counter, -2.0, 2.0)};
+        const double radius = between(&counter, 0.01, 1.5);
+        const vshi_light_part part = vshi_light_covers(&world, centre, radius);
+        ++parts[part];
+        assert_int_equal(vshi_light_covers(&moved, vshi_transform_point(matrix, centre), radius / 0.5), part);
+        for (int i = 0; i < POINTS; ++i) {
+            const vshi_vec off = {between(&counter, -1.0, 1.0), between(&counter, -1.0, 1.0),
+                                  between(&counter, -1.0, 1.0)};
+            if (vshi_length(off) > 1.0) {
+                continue;
+            }
+            const vshi_vec at = vshi_add(centre, vshi_scale(off, radius));
+            vshi_vec to;
+            const double distance = vshi_light_towards(&world, at, &to);
+            const bool lit = vshi_light_lights(&world, at);
+            assert_true(part == VSHI_LIGHT_SOME_PART || lit == (part == VSHI_LIGHT_ALL));
+            assert_true(lit == (vshi_light_gain(&light, to, distance) > 0.0));
+        }
+    }
+    assert_true(parts[0] > 100 && parts[1] > 100 && parts[2] > 100);
 }

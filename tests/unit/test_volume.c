@@ -102,14 +102,21 @@ static float *query_shadow(const vsh_occluders *occluders, const vsh_light *ligh
 TEST(volumes_have_the_values_of_queries_at_voxel_centres) {
     const double low[3] = {-3.0, -0.4, -3.0}, high[3] = {3.0, 4.0, 3.0};
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.05, 4.0);
-    const vsh_light lights[LIGHTS] = {sun(truth_seeds_sun, 0.2), lamp((const double[]){1.0, 1.5, 1.0}, 0.2)};
+    vsh_light lights[4] = {sun(truth_seeds_sun, 0.2), lamp((const double[]){1.0, 1.5, 1.0}, 0.2)};
+    lights[2] = lights[3] = lights[1];
+    strcpy(lights[2].name, "fading");
+    lights[2].falloff = VSH_FALLOFF_QUADRATIC;
+    lights[2].reach = 1.8;
+    strcpy(lights[3].name, "spot");
+    lights[3].type = VSH_LIGHT_SPOT;
     for (int32_t method = VSH_SHADOW_HARD; method <= VSH_SHADOW_CONE; ++method) {
         vsh_volume_options options = preview_volume_options();
         options.shade.method = method;
         for (int coarse = 0; coarse < 2; ++coarse) {
             OWNED(vsh_voxels) *voxels = box_of(low, high, coarse ? 0.4 : 0.06);
-            OWNED(vsh_volume) *volume = bake(occluders_of(field), voxels, lights, LIGHTS, &options, NULL);
-            for (size_t l = 0; l < LIGHTS; ++l) {
+            OWNED(vsh_volume) *volume =
+                bake(occluders_of(field), voxels, lights, COUNT_OF(lights), &options, NULL);
+            for (size_t l = 0; l < COUNT_OF(lights); ++l) {
                 FREED_BY(free_dense) dense d = copy_of(volume, l, voxels);
                 FREED float *distance = distances_of(field, d.count, d.centre);
                 FREED float *values =
