@@ -305,9 +305,9 @@ static bool attach_mesh(vshi_triangles *triangles, const vshi_mesh_set *set, siz
     return vertices != NULL && corners != NULL;
 }
 
-/* Fails with the reason that Embree, the limit or the job gives. */
-static vsh_result fail_build(const vshi_triangles *triangles, vshi_job *job, vsh_error *error) {
-    const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
+/* Fails with the reason that the limit, the job or Embree's `code` gives. */
+static vsh_result fail_by(const vshi_triangles *triangles, enum RTCError code, vshi_job *job,
+                          vsh_error *error) {
     if (atomic_load(&triangles->refused)) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: the memory limit of %.0f MB is passed",
                          (double)triangles->limit / 1e6);
@@ -319,6 +319,11 @@ static vsh_result fail_build(const vshi_triangles *triangles, vshi_job *job, vsh
         return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
     }
     return vshi_fail(error, VSH_ERROR_INTERNAL, "triangles: Embree's error %d", (int)code);
+}
+
+/* Fails with the device's error, which reading clears. */
+static vsh_result fail_build(const vshi_triangles *triangles, vshi_job *job, vsh_error *error) {
+    return fail_by(triangles, triangles->embree->rtcGetDeviceError(triangles->device), job, error);
 }
 
 /* Builds the tree on the threads of the arena around the call. */
@@ -357,14 +362,10 @@ static vsh_result build_tree(vshi_triangles *triangles, vshi_job *job, vsh_error
     if (result != VSH_OK) {
         return result;
     }
-    if (vshi_job_cancelled(job)) {
-        return vshi_job_fail_cancelled(job, error);
-    }
     const enum RTCError code = triangles->embree->rtcGetDeviceError(triangles->device);
-    if (code != RTC_ERROR_NONE || atomic_load(&triangles->refused)) {
-        return fail_build(triangles, job, error);
-    }
-    return VSH_OK;
+    return code != RTC_ERROR_NONE || atomic_load(&triangles->refused) || vshi_job_cancelled(job)
+               ? fail_by(triangles, code, job, error)
+               : VSH_OK;
 }
 
 static vsh_result build(vshi_triangles *triangles, const vshi_mesh_set *set, vshi_job *job,
