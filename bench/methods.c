@@ -245,45 +245,56 @@ typedef struct receiver {
  * than CREASE, and samples closer than CLEAR are not shaded. */
 static const double CREASE = 0.75, CLEAR = 0.25;
 
-/* Every STRIDE-th sample in both directions, so that the truth takes a minute, not an hour. */
-static receiver take_texels(const vsh_field *field, const vsh_charts *charts) {
-    vsh_error error;
-    vshi_texels *texels;
-    bench_check(vshi_texels_create(charts, NULL, &texels, &error), &error);
-    const vshi_texel_samples s = vshi_texels_samples(texels);
+/* The texels of an asset on their way into a receiver. */
+typedef struct taking {
+    const vsh_field *field;
+    receiver *receiver;
+} taking;
+
+/* Takes every STRIDE-th sample in both directions, so that the truth takes a minute, not an hour. */
+static void take_samples(void *user, const vshi_samples *s) {
+    const taking *t = user;
+    receiver *r = t->receiver;
     vsh_field_info info;
-    vsh_field_get_info(field, &info);
-    const size_t triples = s.count * 3 * sizeof(double);
-    receiver r = {0,
-                  bench_take(triples),
-                  bench_take(triples),
-                  bench_take(triples),
-                  bench_take(s.count * 3 * sizeof(float)),
-                  bench_take(s.count * sizeof(float))};
-    for (size_t i = 0; i < s.count; ++i) {
-        if (vsh_texel_column(s.texels[i]) % STRIDE != 0 || vsh_texel_row(s.texels[i]) % STRIDE != 0) {
+    vsh_field_get_info(t->field, &info);
+    for (size_t i = 0; i < s->count; ++i) {
+        if (vsh_texel_column(s->texel[i]) % STRIDE != 0 || vsh_texel_row(s->texel[i]) % STRIDE != 0) {
             continue;
         }
         double probe[3];
         float distance;
         for (size_t k = 0; k < 3; ++k) {
-            const double p = s.positions[3 * i + k], n = (double)s.geometric_normals[3 * i + k];
-            r.positions[3 * r.count + k] = p;
-            r.origins[3 * r.count + k] = p + LIFT * n;
-            r.normals[3 * r.count + k] = s.normals[3 * i + k];
+            const double p = s->position[3 * i + k], n = (double)s->geometric[3 * i + k];
+            r->positions[3 * r->count + k] = p;
+            r->origins[3 * r->count + k] = p + LIFT * n;
+            r->normals[3 * r->count + k] = s->normal[3 * i + k];
             probe[k] = p + info.voxel_size * n;
         }
-        vsh_field_sample(field, 1, probe, &distance);
+        vsh_field_sample(t->field, 1, probe, &distance);
         const double clear = (double)distance / info.voxel_size;
         const double offset = vsh_shade_options_default().start_offset;
         for (size_t k = 0; k < 3; ++k) {
-            r.lifted[3 * r.count + k] = s.positions[3 * i + k] + (clear < CREASE ? 1.0 : offset) *
-                                                                     info.voxel_size *
-                                                                     (double)s.geometric_normals[3 * i + k];
+            r->lifted[3 * r->count + k] = s->position[3 * i + k] + (clear < CREASE ? 1.0 : offset) *
+                                                                       info.voxel_size *
+                                                                       (double)s->geometric[3 * i + k];
         }
-        r.valid[r.count++] = clear >= CLEAR ? 1.0f : 0.0f;
+        r->valid[r->count++] = clear >= CLEAR ? 1.0f : 0.0f;
     }
-    vshi_texels_free(texels);
+}
+
+static receiver take_texels(const vsh_field *field, const vsh_charts *charts) {
+    vsh_error error;
+    const size_t most = (size_t)charts->info.samples, triples = most * 3 * sizeof(double);
+    receiver r = {0,
+                  bench_take(triples),
+                  bench_take(triples),
+                  bench_take(triples),
+                  bench_take(most * 3 * sizeof(float)),
+                  bench_take(most * sizeof(float))};
+    taking t = {field, &r};
+    for (size_t tile = 0; tile < vshi_charts_tiles(&charts->sorted); ++tile) {
+        bench_check(vshi_tile_visit(charts, tile, false, take_samples, &t, &error), &error);
+    }
     return r;
 }
 

@@ -10,30 +10,6 @@
 #include <stdint.h>
 #include <vdbshade/lightmap.h>
 
-/* The samples of all texels. The charts are not needed any more. */
-typedef struct vshi_texels vshi_texels;
-
-/* Rasterizes the charts. Free the result with vshi_texels_free(). Errors: VSH_ERROR_ARGUMENT (texels or
- * charts NULL, run), VSH_ERROR_LIMIT (run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_texels_create(const vsh_charts *charts, const vsh_run *run, vshi_texels **texels,
-                              vsh_error *error);
-void vshi_texels_free(vshi_texels *texels); /* NULL does nothing */
-
-/* The samples behind a lightmap, tile by tile. A view into the texels. Positions are
- * lifted off coarse triangles towards the smooth surface (Hanika, "Hacking the shadow terminator", 2021).
- * Shadow rays begin there where the light grazes the triangle. They begin on the triangle where the light
- * stands well above it, and in between near other triangles. Rays of AO begin on the triangle. */
-typedef struct vshi_texel_samples {
-    size_t count;            /* samples */
-    const double *positions; /* [count][3], world units */
-    const float *normals;    /* [count][3], unit, decide shadow: smooth where the mesh is, or geometric */
-    const float *geometric_normals; /* [count][3], unit */
-    const uint32_t *texels;         /* [count], each vsh_texel() */
-} vshi_texel_samples;
-
-/* Cannot fail; the arrays belong to the texels. */
-vshi_texel_samples vshi_texels_samples(const vshi_texels *texels);
-
 /* --- conservative rasterisation of UV triangles over cells, exact and watertight (raster.c) */
 
 enum {
@@ -207,10 +183,6 @@ typedef struct vshi_samples {
     uint32_t *mesh;   /* [room]: its number, and VSHI_SAMPLE_… */
     float *tangent;   /* [room][4]: of the triangle, unit, and its handedness; NULL: not wanted */
 } vshi_samples;
-
-struct vshi_texels {
-    vshi_samples samples;
-};
 
 /* Bytes of one sample. */
 static inline size_t vshi_sample_bytes(bool tangents) {

@@ -1,9 +1,7 @@
-/* One tile of a lightmap: its cells and its samples; the samples of all tiles. */
+/* One tile of a lightmap: its cells and its samples. */
 #include "lightmap/texels.h"
 
-#include "base/floats.h"
 #include "base/memory.h"
-#include "base/parallel.h"
 #include "shade/shade.h"
 
 #include <stdlib.h>
@@ -323,77 +321,4 @@ done:
     vshi_samples_free(&samples);
     vshi_tile_close(&tile);
     return result;
-}
-
-/* --- the samples of all texels */
-
-typedef struct rasterization {
-    const vsh_charts *charts;
-    vshi_samples *samples; /* of all tiles */
-    size_t *start;         /* [tiles]: where a tile's samples begin */
-} rasterization;
-
-static vsh_result write_tile(void *user, size_t number, vsh_error *error) {
-    const rasterization *all = user;
-    const vsh_charts *charts = all->charts;
-    if (charts->samples[number] == 0) {
-        return VSH_OK;
-    }
-    vshi_tile tile;
-    vshi_samples own = *all->samples; /* the same arrays, written from the tile's start on */
-    own.count = all->start[number];
-    vshi_sample_writer writer = {.charts = charts, .tile = &tile, .samples = &own};
-    const vsh_result result = vshi_tile_open(&charts->sorted, number, &tile, error);
-    if (result == VSH_OK) {
-        vshi_samples_write_rows(&writer, &tile, 0, VSHI_TILE_CELLS);
-    }
-    vshi_tile_close(&tile);
-    return result;
-}
-
-static vsh_result make(const vsh_charts *charts, const vsh_run *run, vshi_texels *texels, vsh_error *error) {
-    rasterization all = {.charts = charts, .samples = &texels->samples};
-    const size_t tiles = vshi_charts_tiles(&charts->sorted), count = (size_t)charts->info.samples;
-    const double bytes = (double)count * (double)vshi_sample_bytes(charts->tangents);
-    VSHI_TRY(vshi_check_limit(run, (double)charts->info.bytes + bytes, "texels", error));
-    VSHI_TRY(vshi_samples_allocate(&texels->samples, count, charts->tangents, error));
-    VSHI_TRY(vshi_allocate((void **)&all.start, tiles + 1, sizeof *all.start, "texels", error));
-    for (size_t i = 0; i < tiles; ++i) {
-        all.start[i + 1] = all.start[i] + (size_t)charts->samples[i];
-    }
-    texels->samples.count = count;
-    const vsh_result result = vshi_run_stage(run, "texels", tiles, write_tile, &all, error);
-    free(all.start);
-    return result;
-}
-
-vsh_result vshi_texels_create(const vsh_charts *charts, const vsh_run *run, vshi_texels **texels,
-                              vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_NEEDS(texels);
-    *texels = NULL;
-    VSHI_NEEDS(charts);
-    vsh_run full;
-    vshi_texels *made = NULL;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
-    const vsh_result result = make(charts, &full, made, error);
-    if (result != VSH_OK) {
-        vshi_texels_free(made);
-        return result;
-    }
-    *texels = made;
-    return VSH_OK;
-}
-
-void vshi_texels_free(vshi_texels *texels) {
-    if (texels != NULL) {
-        vshi_samples_free(&texels->samples);
-        free(texels);
-    }
-}
-
-vshi_texel_samples vshi_texels_samples(const vshi_texels *texels) {
-    const vshi_samples *s = &texels->samples;
-    return (vshi_texel_samples){s->count, s->position, s->normal, s->geometric, s->texel};
 }

@@ -354,7 +354,6 @@ static vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     OWNED(vsh_grid) *grid = NULL;
     OWNED(vsh_occluders) *occluders = NULL;
     OWNED(vsh_charts) *charts = NULL, *fine = NULL;
-    OWNED(vshi_texels) *texels = NULL;
     float planes[8][3 * SIDE * SIDE];
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
@@ -363,7 +362,6 @@ static vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     options.width = options.height = SIDE;
     options.tangents = 1;
     MAKE(charts, vsh_charts_create(&mesh, 1, &options, run, NULL, &charts, error));
-    MAKE(texels, vshi_texels_create(charts, run, &texels, error));
     vsh_light lights[] = {vsh_light_default(), vsh_light_default()};
     strcpy(lights[1].name, "moon");
     lights[1].direction[0] = 1.0;

@@ -98,9 +98,6 @@ static void lightmap(fuzz_input *input) {
     mesh.normals = fuzz_byte(input) & 1 ? fuzz_corners : NULL;
     vsh_charts *charts;
     FUZZ_MAKE(charts, vsh_charts_create(&mesh, 1, &options, &run, NULL, &charts, fuzz_error()));
-    if (charts != NULL) {
-        FUZZ_TRY(vshi_texels, texels, vshi_texels_create(charts, &run, &texels, fuzz_error()));
-    }
     if (charts != NULL && FITS(options)) {
         static float planes[8][3 * MOST_TEXELS];
         vsh_shade_options shading = vsh_shade_options_default();

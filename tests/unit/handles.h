@@ -113,10 +113,51 @@ static inline vsh_charts *charts_from(const vsh_mesh *meshes, size_t count,
     return charts;
 }
 
-static inline vshi_texels *texels_from(const vsh_charts *charts) {
-    vshi_texels *texels = NULL;
-    assert_ok(vshi_texels_create(charts, NULL, &texels, &failure));
-    return texels;
+/* The samples of all texels, tile by tile. */
+typedef struct texel_list {
+    vshi_samples all;
+} texel_list;
+
+typedef struct texel_samples {
+    size_t count;
+    const double *positions;        /* lifted off coarse triangles towards the smooth surface */
+    const float *normals;           /* smooth where the mesh is */
+    const float *geometric_normals; /* of the triangles */
+    const uint32_t *texels;         /* each vsh_texel() */
+} texel_samples;
+
+static inline void texel_list_free(texel_list *list) {
+    if (list != NULL) {
+        vshi_samples_free(&list->all);
+        free(list);
+    }
+}
+OWNER(texel_list)
+
+static inline void add_samples(void *user, const vshi_samples *samples) {
+    vshi_samples *all = user;
+    memcpy(all->position + 3 * all->count, samples->position, 3 * samples->count * sizeof(double));
+    memcpy(all->normal + 3 * all->count, samples->normal, 3 * samples->count * sizeof(float));
+    memcpy(all->geometric + 3 * all->count, samples->geometric, 3 * samples->count * sizeof(float));
+    memcpy(all->lift + 3 * all->count, samples->lift, 3 * samples->count * sizeof(float));
+    memcpy(all->texel + all->count, samples->texel, samples->count * sizeof(uint32_t));
+    memcpy(all->mesh + all->count, samples->mesh, samples->count * sizeof(uint32_t));
+    all->count += samples->count;
+}
+
+static inline texel_list *texels_from(const vsh_charts *charts) {
+    texel_list *list = calloc(1, sizeof *list);
+    assert_ok(vshi_samples_allocate(&list->all, (size_t)charts->info.samples, false, &failure));
+    for (size_t tile = 0; tile < vshi_charts_tiles(&charts->sorted); ++tile) {
+        assert_ok(vshi_tile_visit(charts, tile, false, add_samples, &list->all, &failure));
+    }
+    assert_int_equal(list->all.count, charts->info.samples);
+    return list;
+}
+
+static inline texel_samples samples_of(const texel_list *list) {
+    const vshi_samples *s = &list->all;
+    return (texel_samples){s->count, s->position, s->normal, s->geometric, s->texel};
 }
 
 /* --- files */

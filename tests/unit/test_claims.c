@@ -243,8 +243,8 @@ static outcome try(const stage *s, const trial *t) {
                                    .triangles = s->triangles,
                                    .true_triangles = t->lightmap && t->held ? s->triangles : NULL};
     OWNED(vsh_charts) *charts = charts_from(&floor.mesh, 1, &options);
-    OWNED(vshi_texels) *texels = texels_from(charts);
-    const vshi_texel_samples all = vshi_texels_samples(texels);
+    OWNED(texel_list) *texels = texels_from(charts);
+    const texel_samples all = samples_of(texels);
     outcome o = {0};
     if (t->lightmap) {
         vsh_bake_error errors[2] = {{0}};

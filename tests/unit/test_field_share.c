@@ -85,8 +85,8 @@ static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
     const vsh_light light = sun(SUN, 0.04);
     const vsh_lightmap_options options = options_of(VSH_SHADOW_CONE, VSH_AO_CONES);
     OWNED(vsh_charts) *charts = charts_from(&s->floor.mesh, 1, &options);
-    OWNED(vshi_texels) *texels = texels_from(charts);
-    const vshi_texel_samples all = vshi_texels_samples(texels);
+    OWNED(texel_list) *texels = texels_from(charts);
+    const texel_samples all = samples_of(texels);
     assert_ok(vshi_trace_shadow(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, &light, RAYS,
                                 NULL, truth[0], &failure));
     assert_ok(vshi_trace_ao(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, 1.0, RAYS, NULL,

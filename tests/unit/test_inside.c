@@ -20,8 +20,8 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
     options.shade.ao_distance = 0.1;
     options.shade.rays = 4;
     OWNED(vsh_charts) *charts = charts_from(meshes, mesh_count, &options);
-    OWNED(vshi_texels) *texels = texels_from(charts);
-    const vshi_samples *samples = &texels->samples;
+    OWNED(texel_list) *texels = texels_from(charts);
+    const vshi_samples *samples = &texels->all;
     const size_t count = (size_t)size * (size_t)size;
     FREED float *ao = calloc(count, sizeof *ao), *coverage = calloc(count, sizeof *coverage);
     const vsh_lightmap lightmap = {.ao = ao, .coverage = coverage};

@@ -26,8 +26,8 @@ typedef struct scene {
     vsh_field *field;
     vshi_triangles *triangles;
     vsh_charts *charts;
-    vshi_texels *texels, *facets; /* the same samples, of the sphere without normals */
-    vshi_texel_samples lifted, flat;
+    texel_list *texels, *facets; /* the same samples, of the sphere without normals */
+    texel_samples lifted, flat;
 } scene;
 
 static void open_scene(scene *s, const box *other) {
@@ -51,11 +51,11 @@ static void open_scene(scene *s, const box *other) {
     vsh_mesh faceted = s->ball.mesh;
     faceted.normals = NULL;
     s->charts = create(&s->ball.mesh, 1, options, NULL);
-    s->texels = rasterize(s->charts);
+    s->texels = texels_from(s->charts);
     OWNED(vsh_charts) *facets = create(&faceted, 1, options, NULL);
-    s->facets = rasterize(facets);
-    s->lifted = vshi_texels_samples(s->texels);
-    s->flat = vshi_texels_samples(s->facets);
+    s->facets = texels_from(facets);
+    s->lifted = samples_of(s->texels);
+    s->flat = samples_of(s->facets);
     assert_int_equal(s->lifted.count, s->flat.count);
 }
 
@@ -71,8 +71,8 @@ static float value_at(const scene *s, const float *plane, size_t sample) {
 }
 
 static void close_scene(scene *s) {
-    vshi_texels_free(s->facets);
-    vshi_texels_free(s->texels);
+    texel_list_free(s->facets);
+    texel_list_free(s->texels);
     vsh_charts_free(s->charts);
     vshi_triangles_free(s->triangles);
     vshi_field_free(s->field);
@@ -339,11 +339,11 @@ TEST(a_lift_fades_near_other_triangles) {
         open_scene(&s, &wall);
         const vshi_lifter lifter = vshi_lifter_open(occluders_traced(s.field, s.triangles), &light);
         for (size_t i = 0; i < s.flat.count; ++i) {
-            const vshi_lift_point point = vshi_sample_lift_point(&s.texels->samples, i);
+            const vshi_lift_point point = vshi_sample_lift_point(&s.texels->all, i);
             const double length = vshi_length(vshi_lift_find(&lifter, &point));
             const double room = face - s.flat.positions[3 * i];
-            const double x = (double)s.texels->samples.lift[3 * i],
-                         whole = vshi_length(vshi_vec_off(s.texels->samples.lift + 3 * i));
+            const double x = (double)s.texels->all.lift[3 * i],
+                         whole = vshi_length(vshi_vec_off(s.texels->all.lift + 3 * i));
             assert_true(length <= whole * (1.0 + 1e-6));
             if (x > 0.9 * whole && whole > 0.0) {
                 /* up to a quarter of the distance along the lift, which leans by 26 degrees at most */

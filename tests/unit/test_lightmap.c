@@ -200,8 +200,8 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
     FREED_BY(end) stage s = begin(field_of_mesh(&ball.mesh, 0.02), &ball.mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
     assert_int_equal(s.stats.invalid_texels, 0);
-    OWNED(vshi_texels) *texels = rasterize(s.charts);
-    const vshi_texel_samples samples = vshi_texels_samples(texels);
+    OWNED(texel_list) *texels = texels_from(s.charts);
+    const texel_samples samples = samples_of(texels);
     for (size_t k = 0; k < samples.count; ++k) {
         const float *n = samples.normals + 3 * k;
         const double cosine = dot3((double[]){n[0], n[1], n[2]}, towards) / length3(towards);

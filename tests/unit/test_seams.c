@@ -1,4 +1,5 @@
 /* stitch_one(): values on both sides of charts' borders agree, and nothing else moves. */
+#include "handles.h"
 #include "lightmap/seams.h"
 #include "seams.h"
 #include "testing.h"
@@ -223,9 +224,8 @@ TEST(without_coverage_texels_outside_of_charts_are_guesses) {
         add_square(m, 5.0 * (i / 2) + i % 2, places[i], 11.0 + i, 0.0, 1.0);
     }
     OWNED(vsh_charts) *charts = charts_of(&m->mesh, 1);
-    OWNED(vshi_texels) *texels = NULL;
-    assert_ok(vshi_texels_create(charts, NULL, &texels, &failure));
-    const vshi_texel_samples samples = vshi_texels_samples(texels);
+    OWNED(texel_list) *texels = texels_from(charts);
+    const texel_samples samples = samples_of(texels);
     FREED float *plane = random_plane(5), *before = random_plane(5), *covered = new_plane(0.0f);
     for (size_t i = 0; i < samples.count; ++i) {
         covered[vsh_texel_place(samples.texels[i], SIDE)] = 1.0f;

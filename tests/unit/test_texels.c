@@ -7,16 +7,16 @@
 typedef struct sampled {
     vsh_charts *charts;
     vsh_charts_info info;
-    vshi_texels *texels;
-    vshi_texel_samples samples;
+    texel_list *texels;
+    texel_samples samples;
 } sampled;
 
 static sampled sample(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
                       vsh_uv_report *reports) {
     sampled s = {.charts = create(meshes, count, options, reports)};
     vsh_charts_get_info(s.charts, &s.info);
-    s.texels = rasterize(s.charts);
-    s.samples = vshi_texels_samples(s.texels);
+    s.texels = texels_from(s.charts);
+    s.samples = samples_of(s.texels);
     return s;
 }
 
@@ -27,7 +27,7 @@ static vsh_mesh triangle_mesh(const float positions[9], const float uvs[6]) {
 }
 
 static void free_sampled(sampled *s) {
-    vshi_texels_free(s->texels);
+    texel_list_free(s->texels);
     vsh_charts_free(s->charts);
 }
 
@@ -288,7 +288,7 @@ TEST(samples_of_a_coarse_smooth_sphere_are_lifted_to_within_its_sag) {
     sampled both[2];
     make_sphere(&s, 6, radius);
     sample_both(&s, 64, both);
-    const vshi_texel_samples a = both[0].samples, b = both[1].samples;
+    const texel_samples a = both[0].samples, b = both[1].samples;
     /* A facet is deepest below the middle of its cell's diagonal. */
     double sag = 0.0, worst = 0.0, before = 0.0;
     for (size_t i = 0; i < a.count; ++i) {

@@ -3,6 +3,7 @@
 #include "casts.h"
 #include "directions.h"
 #include "embree.h"
+#include "handles.h"
 #include "testing.h"
 
 OWNER(truth_mesh)
@@ -82,8 +83,8 @@ static vsh_mesh mesh_of(shape *s) {
 /* A lightmap of AO, and what is behind it. */
 typedef struct baked {
     vsh_charts *charts;
-    vshi_texels *texels;
-    vshi_texel_samples samples; /* one a texel */
+    texel_list *texels;
+    texel_samples samples; /* one a texel */
     float *ao, *coverage;
     vsh_bake_stats stats;
 } baked;
@@ -107,8 +108,8 @@ static baked bake(const vsh_mesh *mesh, int32_t resolution, double distance) {
     options.shade.ao_distance = distance;
     options.shade.rays = 16;
     assert_ok(vsh_charts_create(mesh, 1, &options, NULL, NULL, &b.charts, &failure));
-    assert_ok(vshi_texels_create(b.charts, NULL, &b.texels, &failure));
-    b.samples = vshi_texels_samples(b.texels);
+    b.texels = texels_from(b.charts);
+    b.samples = samples_of(b.texels);
     b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
     b.coverage = calloc(SIZE * SIZE, sizeof *b.coverage);
     const vsh_lightmap lightmap = {.ao = b.ao, .coverage = b.coverage};
@@ -117,7 +118,7 @@ static baked bake(const vsh_mesh *mesh, int32_t resolution, double distance) {
 }
 
 static void free_baked(baked *b) {
-    vshi_texels_free(b->texels);
+    texel_list_free(b->texels);
     vsh_charts_free(b->charts);
     free(b->ao);
     free(b->coverage);

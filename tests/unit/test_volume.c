@@ -222,8 +222,8 @@ TEST(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet) {
     const vsh_lightmap planes = {.shadow = shadows_of, .ao = ao, .coverage = coverage};
     assert_ok(vsh_bake_lightmap(occluders_of(field), charts, &light, 1, &options.shade, NULL, &planes, NULL,
                                 &failure));
-    OWNED(vshi_texels) *texels = rasterize(charts);
-    const vshi_texel_samples samples = vshi_texels_samples(texels);
+    OWNED(texel_list) *texels = texels_from(charts);
+    const texel_samples samples = samples_of(texels);
     assert_int_equal(samples.count, TEXELS);
     FREED_BY(free_dense) dense shadows_in = copy_of(volume, 0, voxels), ao_in = copy_of(volume, 1, voxels);
     double worst[2] = {0.0, 0.0}, square[2] = {0.0, 0.0};

@@ -199,7 +199,6 @@ OWNER(vsh_voxels)
 OWNER(vshi_heights)
 OWNER(vshi_solids)
 OWNER(vshi_spheres)
-OWNER(vshi_texels)
 OWNER(vshi_tolerances)
 OWNER(vshi_triangles)
 static inline void vsh_field_release(vsh_field **field) {

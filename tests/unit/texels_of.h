@@ -1,6 +1,7 @@
 /* Texels of small meshes, for their tests. */
 #pragma once
 
+#include "handles.h"
 #include "previews.h"
 #include "testing.h"
 
@@ -17,12 +18,6 @@ static inline vsh_charts *create(const vsh_mesh *meshes, size_t count, vsh_light
     vsh_charts *charts = NULL;
     assert_ok(vsh_charts_create(meshes, count, &options, NULL, reports, &charts, &failure));
     return charts;
-}
-
-static inline vshi_texels *rasterize(const vsh_charts *charts) {
-    vshi_texels *texels = NULL;
-    assert_ok(vshi_texels_create(charts, NULL, &texels, &failure));
-    return texels;
 }
 
 /* A quad in the plane z = 0 at x = 2 u, y = 3 v, facing +z. */
