@@ -3,7 +3,6 @@
 
 #include "base/vec.h"
 
-#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -35,8 +34,8 @@ static const vshi_plane_kind kinds[] = {
     {"shadow", .per_light = true, .range = VSHI_RANGE_SHARE, .padded = true, .needs = VSHI_NEEDS_LIGHTS,
      PLANE(shadow)},
     {"ao", .range = VSHI_RANGE_SHARE, .padded = true, .needs = VSHI_NEEDS_AO, PLANE(ao)},
-    {"error", .per_light = true, .needs = VSHI_NEEDS_LIGHTS | VSHI_NEEDS_DEVIATION, PLANE(shadow_error)},
-    {"error.ao", .needs = VSHI_NEEDS_AO | VSHI_NEEDS_DEVIATION, PLANE(ao_error)},
+    {"error", .per_light = true, .needs = VSHI_NEEDS_LIGHTS, PLANE(shadow_error)},
+    {"error.ao", .needs = VSHI_NEEDS_AO, PLANE(ao_error)},
     {"irradiance", "RGB", VSHI_HOLDS_LIGHT, .range = VSHI_RANGE_LIGHT, .padded = true,
      .needs = VSHI_NEEDS_LIGHTS, PLANE(irradiance)},
     {"bent", "XYZ", VSHI_HOLDS_VECTOR, .padded = true, .needs = VSHI_NEEDS_AO, PLANE(bent)},
@@ -51,22 +50,6 @@ enum { KINDS = sizeof kinds / sizeof kinds[0] };
 const vshi_plane_kind *vshi_plane_kinds(size_t *count) {
     *count = KINDS;
     return kinds;
-}
-
-bool vshi_channel_range(const char *name, float *low, float *high) {
-    static const float ROUNDING = 1e-4f; /* for means of unit directions and of shares */
-    for (const vshi_plane_kind *kind = kinds; kind < kinds + KINDS; ++kind) {
-        const size_t length = strlen(kind->name);
-        if (strncmp(name, kind->name, length) == 0 && (name[length] == '\0' || name[length] == '.')) {
-            const bool is_error = (kind->needs & VSHI_NEEDS_DEVIATION) != 0;
-            *low = (kind->holds == VSHI_HOLDS_VECTOR ? -1.0f : 0.0f) - ROUNDING;
-            *high = is_error || kind->range == VSHI_RANGE_LIGHT ? FLT_MAX : 1.0f + ROUNDING;
-            return is_error; /* methods without an estimate give NaN */
-        }
-    }
-    *low = -ROUNDING;
-    *high = FLT_MAX;
-    return true;
 }
 
 bool vshi_plane_next(const vsh_lightmap *lightmap, size_t light_count, vshi_plane_cursor *c) {

@@ -13,8 +13,7 @@ int32_t vshi_planes_shaded(const vsh_planes *planes);
 enum {
     VSHI_NEEDS_LIGHTS = 1, /* the visibility of lights; planes of lights are filled as they are shaded */
     VSHI_NEEDS_AO = 2,     /* AO; planes of AO are filled like those of lights */
-    VSHI_NEEDS_OPEN = 4,   /* its own shading, by the rays of AO */
-    VSHI_NEEDS_DEVIATION = 8
+    VSHI_NEEDS_OPEN = 4    /* its own shading, by the rays of AO */
 };
 
 enum { VSHI_NO_WISH = -1 };
@@ -46,10 +45,6 @@ typedef struct vshi_plane_kind {
 
 /* The kinds, in the order of their channels in files. */
 const vshi_plane_kind *vshi_plane_kinds(size_t *count);
-
-/* Finds the range of baked values in the channel `name`, "shadow.sun" or "ao". Returns whether they may be
- * NaN. */
-bool vshi_channel_range(const char *name, float *low, float *high);
 
 static inline size_t vshi_plane_components(const vshi_plane_kind *kind) {
     return kind->axes != NULL ? 3 : 1;

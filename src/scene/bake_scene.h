@@ -149,38 +149,38 @@ void vshi_lit_pages_free(vshi_scene_bake *bake);
 
 /* --- parts: each file holds every N-th tile, as vshi_trace_tiles() left it
  *
- * A file is: vshi_part_front; the head (inputs, options, texts); the tiles; a checksum. It appears whole or
- * not at all, and holds no time and no name of a machine. Readers check all of it. */
+ * A file is: vshi_part_front; texts; for each tile, in order, what it leaves; a checksum. It appears whole or
+ * not at all, and holds no time and no name of a machine. A merge trusts the values of tiles whose part has
+ * the right checksum and head, but reads and writes nothing out of bounds whatever they are. */
 
 /* The format's number is in the magic, in base 36: another one is another version's. */
-#define VSHI_PART_MAGIC "vdbshade part A\n"
+#define VSHI_PART_MAGIC "vdbshade part B\n"
 #define VSHI_PART_MAGIC_BEGIN "vdbshade part "
 #define VSHI_PART_ORDER UINT64_C(0x0102030405060708)
 #define VSHI_PART_SUM UINT64_C(0xcbf29ce484222325) /* of no bytes */
 
 enum { VSHI_MOST_SHARDS = 10000 };
 
-/* Before the head. Numbers have the byte order of the machine that wrote them, which `order` shows. */
+/* Begins a part. Numbers have the byte order of the machine that wrote them, which `order` shows. */
 typedef struct vshi_part_front {
     char magic[16];
     uint64_t order;
-    uint64_t head_bytes; /* a multiple of 8; the tiles follow, then the checksum's 8 bytes */
+    uint64_t head_bytes; /* of the texts, each with its NUL: words, then names and values of attributes */
+    uint64_t words;      /* their number */
+    uint64_t layout;     /* a hash of the lightmaps, channels and casters */
+    uint64_t active_voxels, field_bytes; /* of the casters, as in vsh_occluders_info */
+    double voxel_size;
+    int32_t levels, has_triangles;
+    int32_t layered_ao; /* as of the job */
+    int32_t shard, shard_count;
+    int32_t unused;
 } vshi_part_front;
 
-/* Begins a tile. Its statistics and the errors of channels follow, then its texels, array by array, then the
- * texels to compare with the casters. */
-typedef struct vshi_part_tile {
-    uint32_t lightmap, tile;
-    uint32_t held[2]; /* texels of AO, of the sky */
-} vshi_part_tile;
-
-/* FNV-1a (Fowler, Noll and Vo, 1991), a word of four bytes at a time. */
+/* FNV-1a (Fowler, Noll and Vo, 1991). */
 static inline uint64_t vshi_part_sum(uint64_t sum, const void *bytes, size_t size) {
     const unsigned char *at = bytes;
-    for (size_t i = 0; i + 4 <= size; i += 4) {
-        uint32_t word;
-        memcpy(&word, at + i, 4);
-        sum = (sum ^ word) * UINT64_C(0x100000001b3);
+    for (size_t i = 0; i < size; ++i) {
+        sum = (sum ^ at[i]) * UINT64_C(0x100000001b3);
     }
     return sum;
 }
@@ -229,7 +229,7 @@ void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vs
 /* Notes which lights, and whether the sky, reach the meshes of a baked page. */
 void vshi_note_lit(const vshi_scene_page *page);
 
-/* Warns of lights, and of the sky, that one object hides from all other objects of a bake. */
+/* Warns of lights, and of the sky, that reach no texel, or one object of several. */
 void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run);
 
 /* Warns of light that the file's integers cut. */

@@ -8,12 +8,10 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "lightmap/planes.h"
-#include "shade/ao.h"
 
 #include <dirent.h>
 #include <errno.h>
 #include <inttypes.h>
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
@@ -28,8 +26,6 @@ static vsh_result refuse_memory(const char *what, vsh_error *error) {
 }
 
 /* --- names of parts */
-
-enum { MOST_NAMED = 6 }; /* missing parts in a message */
 
 /* The name of the parts' files: the options' name, or the first lightmap's output. */
 static const char *find_parts_name(const vshi_scene_bake *bake) {
@@ -90,170 +86,57 @@ static vsh_result count_shards(const char *parts, int32_t *count, vsh_error *err
                            least, most);
 }
 
-/* Fails if a part is missing, with the numbers of the missing ones. */
-static vsh_result check_all_there(const char *name, int32_t count, vsh_error *error) {
-    char list[256] = "";
+/* Finds the number of parts if *count is 0. Fails if one is missing, with the numbers of the missing ones. */
+static vsh_result find_parts(const char *name, int32_t *count, vsh_error *error) {
+    enum { MOST_NAMED = 6 };
+    char list[128] = "";
     size_t at = 0;
     int32_t missing = 0;
-    for (int32_t i = 1; i <= count; ++i) {
+    VSHI_TRY(*count == 0 ? count_shards(name, count, error) : VSH_OK);
+    for (int32_t i = 1; i <= *count; ++i) {
         char *path;
-        VSHI_TRY(name_part(name, i, count, &path, error));
-        if (access(path, F_OK) != 0 && ++missing <= MOST_NAMED && at < sizeof list) {
+        VSHI_TRY(name_part(name, i, *count, &path, error));
+        if (access(path, F_OK) != 0 && ++missing <= MOST_NAMED) {
             at += (size_t)snprintf(list + at, sizeof list - at, "%s%d", missing > 1 ? ", " : "", i);
         }
         free(path);
     }
-    if (missing == 0) {
-        return VSH_OK;
-    }
-    if (missing > MOST_NAMED && at < sizeof list) {
+    if (missing > MOST_NAMED) {
         snprintf(list + at, sizeof list - at, " and %d more", missing - MOST_NAMED);
     }
-    return vshi_fail(error, VSH_ERROR_READ, "%s: %s missing: %s of %d; bake %s by --shard I/%d", name,
-                     missing == 1 ? "a part is" : "parts are", list, count, missing == 1 ? "it" : "them",
-                     count);
+    return missing == 0
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_READ, "%s: missing parts: %s of %d; bake them by --shard I/%d",
+                           name, list, *count, *count);
 }
 
-/* --- the head */
+/* --- bytes of a part, read or written alike */
 
-/* Begins the head. The lightmaps follow, then the texts, each with its NUL: the library's version, words,
- * names and values of attributes, channels; then bytes of 0 up to a multiple of 8. */
-typedef struct head_numbers {
-    uint64_t words, attributes, channels, lightmaps; /* their numbers */
-    uint64_t errors;                                 /* as in vsh_bake_report */
-    uint64_t active_voxels, field_bytes;             /* of the casters, as in vsh_occluders_info */
-    double voxel_size;
-    int32_t levels, has_triangles;
-    int32_t layered_ao; /* as of the job */
-    int32_t shard, shard_count;
-    int32_t unused;
-} head_numbers;
+typedef struct part_file {
+    FILE *file; /* NULL: closed */
+    const char *path;
+    bool reads;
+    uint64_t sum; /* of the bytes that were written */
+} part_file;
 
-/* A lightmap of the job. */
-typedef struct part_lightmap {
-    uint64_t mesh_count, covered, samples; /* as in vsh_scene_lightmap */
-    int32_t width, height;
-} part_lightmap;
-
-enum { ROUND = 8 };
-
-typedef struct part_head {
-    head_numbers numbers;
-    char *bytes; /* owned: all of it, a multiple of 8 */
-    size_t size;
-    const char **texts;                           /* owned; they lie in `bytes` */
-    const char **words, **attributes, **channels; /* in `texts` */
-    const part_lightmap *lightmaps;               /* in `bytes` */
-} part_head;
-
-static void free_head(part_head *head) {
-    free(head->texts);
-    free(head->bytes);
-    *head = (part_head){.bytes = NULL};
+static void close_file(part_file *f) {
+    if (f->file != NULL) {
+        fclose(f->file);
+        f->file = NULL;
+    }
 }
 
-/* Finds numbers, lightmaps and texts in the bytes of a head, and checks that they are there. */
-static vsh_result parse_head(const char *path, part_head *head, vsh_error *error) {
-    head_numbers *n = &head->numbers;
-    size_t size = head->size;
-    if (size < sizeof *n) {
-        return fail_damaged(path, "its head", error);
+/* Reads bytes from the file, or writes them. */
+static vsh_result move_bytes(part_file *f, void *bytes, size_t size, vsh_error *error) {
+    const size_t moved = f->reads ? fread(bytes, 1, size, f->file) : fwrite(bytes, 1, size, f->file);
+    f->sum = f->reads ? f->sum : vshi_part_sum(f->sum, bytes, size);
+    if (moved == size) {
+        return VSH_OK;
     }
-    memcpy(n, head->bytes, sizeof *n);
-    size -= sizeof *n;
-    if (n->lightmaps > size / sizeof *head->lightmaps) {
-        return fail_damaged(path, "its head", error);
-    }
-    head->lightmaps = (const part_lightmap *)(const void *)(head->bytes + sizeof *n);
-    size -= (size_t)n->lightmaps * sizeof *head->lightmaps;
-    const char *text = (const char *)(head->lightmaps + n->lightmaps);
-    const uint64_t count = 1 + n->words + 2 * n->attributes + n->channels;
-    if (n->words > size || n->attributes > size || n->channels > size || count > size) {
-        return fail_damaged(path, "its head", error);
-    }
-    VSHI_TRY(vshi_allocate((void **)&head->texts, (size_t)count, sizeof *head->texts, path, error));
-    for (size_t i = 0; i < count; ++i) {
-        const size_t length = strnlen(text, size);
-        if (length == size) {
-            return fail_damaged(path, "its head", error);
-        }
-        head->texts[i] = text;
-        text += length + 1;
-        size -= length + 1;
-    }
-    head->words = head->texts + 1;
-    head->attributes = head->words + n->words;
-    head->channels = head->attributes + 2 * n->attributes;
-    return size < ROUND ? VSH_OK : fail_damaged(path, "its head", error);
+    const char *why = f->reads && feof(f->file) ? "it ends early" : strerror(errno);
+    return f->reads ? vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", f->path, why)
+                    : vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", f->path, why);
 }
-
-static void put_text(FILE *out, const char *text) {
-    fwrite(text, strlen(text) + 1, 1, out);
-}
-
-/* Makes the head of the job's part, or in a merge the head that parts should have. Free it also after an
- * error. */
-static vsh_result make_head(const vshi_scene_bake *bake, part_head *head, vsh_error *error) {
-    const vsh_occluders_info *casters = &bake->report.occluders;
-    size_t attribute_count;
-    const vsh_attribute *attributes = vsh_provenance_attributes(bake->provenance, &attribute_count);
-    vshi_channels channels;
-    vsh_result result;
-    *head = (part_head){.bytes = NULL};
-    VSHI_TRY_DONE(vshi_channels_name(&bake->scene, 1, 1, &channels, error));
-    const head_numbers numbers = {.words = bake->options.word_count,
-                                  .attributes = attribute_count,
-                                  .channels = (uint64_t)channels.image.channel_count,
-                                  .lightmaps = bake->target_count,
-                                  .errors = bake->error_count,
-                                  .active_voxels = casters->active_voxels,
-                                  .field_bytes = casters->field_bytes,
-                                  .voxel_size = casters->voxel_size,
-                                  .levels = casters->levels,
-                                  .has_triangles = casters->has_triangles,
-                                  .layered_ao = bake->layered_ao,
-                                  .shard = bake->options.shard,
-                                  .shard_count = bake->options.shard_count};
-    FILE *out = open_memstream(&head->bytes, &head->size);
-    VSHI_TRY_DONE(out != NULL ? VSH_OK : refuse_memory("part", error));
-    fwrite(&numbers, sizeof numbers, 1, out);
-    for (size_t i = 0; i < bake->target_count; ++i) {
-        const vsh_scene_lightmap *own = &bake->lightmaps[i];
-        const part_lightmap lightmap = {own->mesh_count, own->covered, own->samples, own->width, own->height};
-        fwrite(&lightmap, sizeof lightmap, 1, out);
-    }
-    put_text(out, VSHI_VERSION);
-    for (size_t i = 0; i < bake->options.word_count; ++i) {
-        put_text(out, bake->options.words[i]);
-    }
-    for (size_t i = 0; i < attribute_count; ++i) {
-        put_text(out, attributes[i].name);
-        put_text(out, attributes[i].value);
-    }
-    for (int32_t i = 0; i < channels.image.channel_count; ++i) {
-        put_text(out, channels.names[i]);
-    }
-    while (ftello(out) % ROUND != 0) {
-        fputc('\0', out);
-    }
-    VSHI_TRY_DONE(fclose(out) == 0 ? VSH_OK : refuse_memory("part", error));
-    result = parse_head("part", head, error);
-done:
-    vshi_channels_free(&channels);
-    return result;
-}
-
-/* --- tiles */
-
-/* An array of a page, [height][width] elements of so many bytes. */
-typedef struct tile_array {
-    unsigned char *values;
-    size_t size;
-    const char *channel; /* of values that have a range; NULL: no channel */
-} tile_array;
-
-/* The most arrays of a page, and the most bytes of a tile in one. */
-enum { MOST_ARRAYS = VSH_MAX_CHANNELS + 8, MOST_TILE_BYTES = VSHI_TILE * VSHI_TILE * 3 * sizeof(float) };
 
 /* Whether a plane is set when the page is finished, not by its tiles. */
 static bool is_finished_later(const vshi_scene_page *page, const float *plane) {
@@ -262,33 +145,6 @@ static bool is_finished_later(const vshi_scene_page *page, const float *plane) {
            (page->page.ao.share != NULL &&
             (plane == planes->ao || plane == planes->ao_error || plane == planes->bent)) ||
            (page->page.sky.share != NULL && plane == planes->sky);
-}
-
-static size_t add_shots(const vshi_shots *shots, tile_array *arrays) {
-    if (shots->share == NULL) {
-        return 0;
-    }
-    arrays[0] = (tile_array){(unsigned char *)shots->share, sizeof *shots->share, NULL};
-    arrays[1] = (tile_array){(unsigned char *)shots->rays, sizeof *shots->rays, NULL};
-    arrays[2] = (tile_array){shots->level, sizeof *shots->level, NULL};
-    arrays[3] = (tile_array){(unsigned char *)shots->open, 3 * sizeof *shots->open, NULL};
-    return shots->open != NULL ? 4 : 3;
-}
-
-/* Lists the arrays of a page that its tiles set; returns how many there are. */
-static size_t list_arrays(const vshi_scene_page *page, tile_array arrays[MOST_ARRAYS]) {
-    const vshi_channels *channels = &page->channels;
-    size_t count = 0, channel = 0;
-    arrays[count++] = (tile_array){page->page.state, 1, NULL};
-    for (size_t i = 0; i < channels->value_count; ++i) {
-        if (!is_finished_later(page, channels->values[i])) {
-            arrays[count++] = (tile_array){(unsigned char *)channels->values[i],
-                                           channels->components[i] * sizeof(float), channels->names[channel]};
-        }
-        channel += channels->components[i];
-    }
-    count += add_shots(&page->page.ao, arrays + count);
-    return count + add_shots(&page->page.sky, arrays + count);
 }
 
 /* Texels of a tile: columns and rows from the first on. */
@@ -310,147 +166,75 @@ static size_t find_texel(const vshi_scene_page *page, const place *at, size_t k)
     return (at->top + k / at->columns) * page->page.width + at->left + k % at->columns;
 }
 
-/* Bytes of a tile's texels in an array, rounded up to a multiple of 4. */
-static size_t count_bytes(const tile_array *array, const place *at) {
-    return (at->columns * at->rows * array->size + 3) / 4 * 4;
-}
-
-/* Copies the texels of a tile out of an array, or into it. */
-static void copy_tile(const vshi_scene_page *page, const tile_array *array, const place *at,
-                      unsigned char *bytes, bool in) {
-    const size_t size = at->columns * array->size;
-    for (size_t y = 0; y < at->rows; ++y, bytes += size) {
-        unsigned char *row = array->values + ((at->top + y) * page->page.width + at->left) * array->size;
-        memcpy(in ? row : bytes, in ? bytes : row, size);
+/* Moves a tile's texels of an array of the page, whose elements have `size` bytes. */
+static vsh_result move_array(part_file *f, const vshi_scene_page *page, const place *at, void *array,
+                             size_t size, vsh_error *error) {
+    for (size_t y = at->top; y < at->top + at->rows; ++y) {
+        unsigned char *row = (unsigned char *)array + (y * page->page.width + at->left) * size;
+        VSHI_TRY(move_bytes(f, row, at->columns * size, error));
     }
+    return VSH_OK;
 }
 
-static vsh_result check_values(const vshi_scene_page *page, const tile_array *array, size_t texel,
-                               const char *path, vsh_error *error) {
-    float low, high;
-    const bool may_be_nan = vshi_channel_range(array->channel, &low, &high);
-    const size_t count = array->size / sizeof(float);
-    for (size_t k = 0; k < count; ++k) {
-        const float value = ((const float *)(const void *)array->values)[count * texel + k];
-        if (!(value >= low && value <= high) && !(may_be_nan && isnan(value))) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "%s: damaged: '%s' of texel (%zu, %zu) of lightmap %zu is %g, out of range %g … "
-                             "%g; bake this part again",
-                             path, array->channel, texel % page->page.width, texel / page->page.width,
-                             page->target->index, (double)value, (double)low, (double)high);
+/* Moves a tile's texels to compare with the casters. What is read must lie in the tile. */
+static vsh_result move_held(part_file *f, const place *at, vshi_held_texels *held, vsh_error *error) {
+    uint64_t count = held->count;
+    VSHI_TRY(move_bytes(f, &count, sizeof count, error));
+    if (count > VSHI_TILE * VSHI_TILE) {
+        return fail_damaged(f->path, "its tiles", error);
+    }
+    if (f->reads) {
+        VSHI_TRY(vshi_allocate((void **)&held->list, (size_t)count, sizeof *held->list, f->path, error));
+    }
+    VSHI_TRY(move_bytes(f, held->list, (size_t)count * sizeof *held->list, error));
+    for (held->count = 0; held->count < count; ++held->count) {
+        const uint32_t texel = held->list[held->count].texel;
+        const size_t x = vsh_texel_column(texel), y = vsh_texel_row(texel);
+        if (x < at->left || x >= at->left + at->columns || y < at->top || y >= at->top + at->rows) {
+            return fail_damaged(f->path, "its tiles", error);
         }
     }
     return VSH_OK;
 }
 
-/* Whether a texel's shots can be a bake's. */
-static bool is_sound(const vshi_scene_page *page, const vshi_shots *shots, size_t texel) {
-    enum { MOST_RAYS = 1 << 24 };
-    static const float LONGEST = 3.0f; /* mean of open directions, minus its lean */
+static vsh_result move_shots(part_file *f, const vshi_scene_page *page, const place *at, size_t tile,
+                             const vshi_shots *shots, vsh_error *error) {
     if (shots->share == NULL) {
-        return true;
+        return VSH_OK;
     }
-    const uint32_t level = shots->level[texel], spacing = (uint32_t)page->target->charts->ao_spacing;
-    const int32_t rays = shots->rays[texel];
-    const float share = shots->share[texel];
-    bool sound = level == 0 || page->page.state[texel] != VSHI_TEXEL_EMPTY;
-    sound = sound &&
-            (level == 0 || level == VSHI_AO_KNOWN_LEVEL || (level <= spacing && (level & (level - 1)) == 0));
-    sound = sound && rays >= 0 && rays <= MOST_RAYS;
-    sound = sound && ((share >= 0.0f && share <= 1.0f) || (isnan(share) && rays == 0));
-    for (size_t k = 0; k < 3 && shots->open != NULL; ++k) {
-        const float open = shots->open[3 * texel + k];
-        sound = sound && (fabsf(open) <= LONGEST || (isnan(open) && rays == 0));
+    VSHI_TRY(move_array(f, page, at, shots->share, sizeof *shots->share, error));
+    VSHI_TRY(move_array(f, page, at, shots->rays, sizeof *shots->rays, error));
+    VSHI_TRY(move_array(f, page, at, shots->level, sizeof *shots->level, error));
+    if (shots->open != NULL) {
+        VSHI_TRY(move_array(f, page, at, shots->open, 3 * sizeof *shots->open, error));
     }
-    return sound;
+    return move_held(f, at, &shots->held[tile], error);
 }
 
-/* The tile's texels to compare with the casters. */
-static vshi_held_texels find_held(const vshi_shots *shots, size_t tile) {
-    return shots->held != NULL ? shots->held[tile] : (vshi_held_texels){NULL, 0};
-}
-
-static bool are_held_sound(const vshi_scene_page *page, const vshi_shots *shots, size_t tile) {
-    const vshi_held_texels held = find_held(shots, tile);
-    const place at = find_place(page, tile);
-    const int32_t rays = vshi_field_error_rays(page->page.shade.max_error);
-    bool sound = true;
-    for (size_t k = 0; k < held.count; ++k) {
-        const vshi_held_texel *h = &held.list[k];
-        const size_t x = vsh_texel_column(h->texel), y = vsh_texel_row(h->texel);
-        sound = sound && x >= at.left && x < at.left + at.columns && y >= at.top && y < at.top + at.rows &&
-                h->free[0] <= rays && h->free[1] <= rays && h->even >= -1 && h->even <= 1;
-    }
-    return sound;
-}
-
-/* Checks that a bake can have left the values of a tile, once the tile is rasterized. */
-static vsh_result check_tile_values(const vshi_scene_page *page, size_t tile, const char *path,
-                                    vsh_error *error) {
-    const place at = find_place(page, tile);
-    tile_array arrays[MOST_ARRAYS];
-    const size_t count = list_arrays(page, arrays);
+/* Reads or writes what vshi_trace_tiles() leaves of a tile. */
+static vsh_result move_tile(part_file *f, const vshi_scene_page *page, size_t tile, vsh_error *error) {
     const vshi_page *p = &page->page;
-    bool sound = are_held_sound(page, &p->ao, tile) && are_held_sound(page, &p->sky, tile);
-    for (size_t k = 0; k < at.columns * at.rows; ++k) {
-        const size_t texel = find_texel(page, &at, k);
-        for (size_t i = 0; i < count; ++i) {
-            VSHI_TRY(arrays[i].channel != NULL ? check_values(page, &arrays[i], texel, path, error) : VSH_OK);
+    const vshi_channels *channels = &page->channels;
+    const place at = find_place(page, tile);
+    VSHI_TRY(move_bytes(f, &p->stats[tile], sizeof *p->stats, error));
+    VSHI_TRY(move_bytes(f, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors, error));
+    VSHI_TRY(move_array(f, page, &at, p->state, sizeof *p->state, error));
+    for (size_t k = 0; k < at.columns * at.rows; ++k) { /* an index of tables */
+        if (p->state[find_texel(page, &at, k)] > VSHI_TEXEL_INVALID) {
+            return fail_damaged(f->path, "its tiles", error);
         }
-        sound = sound && p->state[texel] <= VSHI_TEXEL_INVALID &&
-                (p->state[texel] != VSHI_TEXEL_EMPTY) == (p->mesh[texel] != 0) &&
-                is_sound(page, &p->ao, texel) && is_sound(page, &p->sky, texel);
     }
-    return sound ? VSH_OK : fail_damaged(path, "its tiles", error);
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        if (!is_finished_later(page, channels->values[i])) {
+            VSHI_TRY(move_array(f, page, &at, channels->values[i], channels->components[i] * sizeof(float),
+                                error));
+        }
+    }
+    VSHI_TRY(move_shots(f, page, &at, tile, &p->ao, error));
+    return move_shots(f, page, &at, tile, &p->sky, error);
 }
 
-/* --- writing */
-
-typedef struct part_output {
-    vshi_output output;
-    FILE *file;
-    uint64_t sum;
-    int error; /* errno of the first write that failed; 0: none */
-} part_output;
-
-/* Writes a multiple of 4 bytes. finish_part() reports errors. */
-static void write_bytes(part_output *part, const void *bytes, size_t size) {
-    part->sum = vshi_part_sum(part->sum, bytes, size);
-    if (size > 0 && fwrite(bytes, size, 1, part->file) != 1 && part->error == 0) {
-        part->error = errno != 0 ? errno : EIO;
-    }
-}
-
-static vsh_result begin_part(const vshi_scene_bake *bake, const char *path, part_output *part,
-                             vsh_error *error) {
-    part_head head;
-    vsh_result result;
-    VSHI_TRY_DONE(make_head(bake, &head, error));
-    VSHI_TRY_DONE(vshi_output_begin(&part->output, path, error));
-    part->file = fopen(part->output.temporary, "wb");
-    if (part->file == NULL) {
-        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
-        goto done;
-    }
-    const vshi_part_front front = {VSHI_PART_MAGIC, VSHI_PART_ORDER, head.size};
-    write_bytes(part, &front, sizeof front);
-    write_bytes(part, head.bytes, head.size);
-done:
-    free_head(&head);
-    return result;
-}
-
-static vsh_result finish_part(part_output *part, vsh_error *error) {
-    const uint64_t sum = part->sum;
-    write_bytes(part, &sum, sizeof sum);
-    if (fclose(part->file) != 0 && part->error == 0) {
-        part->error = errno;
-    }
-    part->file = NULL;
-    return part->error == 0 ? vshi_output_commit(&part->output, error)
-                            : vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s",
-                                        part->output.target, strerror(part->error));
-}
+/* --- which tiles a part has */
 
 /* The part that bakes a tile, from 0 on. On pages from 2048 texels on, tiles go out in runs: neighbours
  * share pages of memory, so parts of single tiles would each touch all of every plane. */
@@ -459,42 +243,93 @@ static uint64_t find_owner(const vsh_charts *charts, uint64_t tile, uint64_t par
     return tile / (run > 1 ? run : 1) % parts;
 }
 
-/* Lists the shard's tiles of a lightmap. *number is that of its first tile with texels, and moves on to the
- * next lightmap's. */
-static vsh_result list_tiles(const vshi_scene_bake *bake, const vsh_charts *charts, uint64_t *number,
+/* Lists the tiles of a lightmap that part `shard` of `shards` has, in their order; to be freed. *number is
+ * that of its first tile with texels, and becomes that of the next lightmap's. */
+static vsh_result list_tiles(const vsh_charts *charts, uint64_t shard, uint64_t shards, uint64_t *number,
                              uint32_t **tiles, size_t *count, vsh_error *error) {
     const size_t all = vshi_charts_tiles(&charts->sorted);
     *count = 0;
     VSHI_TRY(vshi_allocate((void **)tiles, all, sizeof **tiles, "part", error));
     for (size_t tile = 0; tile < all; ++tile) {
-        if (charts->samples[tile] > 0 &&
-            find_owner(charts, (*number)++, (uint64_t)bake->options.shard_count) + 1 ==
-                (uint64_t)bake->options.shard) {
+        if (charts->samples[tile] > 0 && find_owner(charts, (*number)++, shards) + 1 == shard) {
             (*tiles)[(*count)++] = (uint32_t)tile;
         }
     }
     return VSH_OK;
 }
 
-static void write_tile(part_output *file, const vshi_scene_page *page, size_t tile, unsigned char *bytes) {
-    const vshi_page *p = &page->page;
-    const place at = find_place(page, tile);
-    const vshi_held_texels ao = find_held(&p->ao, tile), sky = find_held(&p->sky, tile);
-    const vshi_part_tile head = {
-        (uint32_t)page->target->index, (uint32_t)tile, {(uint32_t)ao.count, (uint32_t)sky.count}};
-    tile_array arrays[MOST_ARRAYS];
-    const size_t count = list_arrays(page, arrays);
-    write_bytes(file, &head, sizeof head);
-    write_bytes(file, &p->stats[tile], sizeof *p->stats);
-    write_bytes(file, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors);
-    for (size_t i = 0; i < count; ++i) {
-        const size_t size = count_bytes(&arrays[i], &at);
-        memset(bytes + size - 4, 0, 4); /* up to a multiple of 4 */
-        copy_tile(page, &arrays[i], &at, bytes, false);
-        write_bytes(file, bytes, size);
+/* Hashes the lightmaps, the channels and the casters. The attributes name the files and options, but programs
+ * can change a scene beside them. */
+static vsh_result hash_layout(const vshi_scene_bake *bake, uint64_t *layout, vsh_error *error) {
+    const vsh_occluders_info *casters = &bake->report.occluders;
+    const double numbers[] = {casters->voxel_size,      (double)casters->active_voxels,
+                              casters->levels,          casters->has_triangles,
+                              (double)bake->layered_ao, (double)bake->error_count};
+    vshi_channels channels;
+    const vsh_result result = vshi_channels_name(&bake->scene, 1, 1, &channels, error);
+    *layout = vshi_part_sum(VSHI_PART_SUM, numbers, sizeof numbers);
+    for (size_t i = 0; i < bake->target_count; ++i) {
+        const vsh_scene_lightmap *l = &bake->lightmaps[i];
+        const uint64_t sizes[] = {(uint64_t)l->width, (uint64_t)l->height, l->mesh_count, l->covered,
+                                  l->samples};
+        *layout = vshi_part_sum(*layout, sizes, sizeof sizes);
     }
-    write_bytes(file, ao.list, ao.count * sizeof *ao.list);
-    write_bytes(file, sky.list, sky.count * sizeof *sky.list);
+    for (int32_t c = 0; result == VSH_OK && c < channels.image.channel_count; ++c) {
+        *layout = vshi_part_sum(*layout, channels.names[c], strlen(channels.names[c]) + 1);
+    }
+    vshi_channels_free(&channels);
+    return result;
+}
+
+/* --- writing */
+
+static void put_text(FILE *out, const char *text) {
+    fwrite(text, strlen(text) + 1, 1, out);
+}
+
+/* Joins the texts of the job's part, to be freed: words, then names and values of attributes. */
+static vsh_result join_texts(const vshi_scene_bake *bake, char **texts, size_t *size, vsh_error *error) {
+    size_t count;
+    const vsh_attribute *attributes = vsh_provenance_attributes(bake->provenance, &count);
+    FILE *out = open_memstream(texts, size);
+    if (out == NULL) {
+        return refuse_memory("part", error);
+    }
+    for (size_t i = 0; i < bake->options.word_count; ++i) {
+        put_text(out, bake->options.words[i]);
+    }
+    for (size_t i = 0; i < count; ++i) {
+        put_text(out, attributes[i].name);
+        put_text(out, attributes[i].value);
+    }
+    return fclose(out) == 0 ? VSH_OK : refuse_memory("part", error);
+}
+
+/* Writes what is before the tiles. */
+static vsh_result write_head(const vshi_scene_bake *bake, part_file *f, vsh_error *error) {
+    const vsh_occluders_info *casters = &bake->report.occluders;
+    vshi_part_front front = {.magic = VSHI_PART_MAGIC,
+                             .order = VSHI_PART_ORDER,
+                             .words = bake->options.word_count,
+                             .active_voxels = casters->active_voxels,
+                             .field_bytes = casters->field_bytes,
+                             .voxel_size = casters->voxel_size,
+                             .levels = casters->levels,
+                             .has_triangles = casters->has_triangles,
+                             .layered_ao = bake->layered_ao,
+                             .shard = bake->options.shard,
+                             .shard_count = bake->options.shard_count};
+    char *texts = NULL;
+    size_t size = 0;
+    vsh_result result;
+    VSHI_TRY_DONE(hash_layout(bake, &front.layout, error));
+    VSHI_TRY_DONE(join_texts(bake, &texts, &size, error));
+    front.head_bytes = size;
+    VSHI_TRY_DONE(move_bytes(f, &front, sizeof front, error));
+    result = move_bytes(f, texts, size, error);
+done:
+    free(texts);
+    return result;
 }
 
 static void add_to_report(vshi_scene_bake *bake, const vshi_scene_page *page, size_t tile) {
@@ -520,57 +355,70 @@ static size_t count_tiles(const vshi_scene_bake *bake) {
     return count;
 }
 
-static vsh_result bake_lightmap(vshi_scene_bake *bake, size_t index, uint64_t *number, part_output *file,
+static vsh_result bake_lightmap(vshi_scene_bake *bake, size_t index, uint64_t *number, part_file *file,
                                 vshi_job *tiles_done, vsh_error *error) {
     vshi_page_group group = {.bake = NULL};
     uint32_t *tiles = NULL;
-    unsigned char *bytes = NULL;
     size_t count;
     const double start = vshi_seconds();
     vsh_result result;
-    VSHI_TRY_DONE(list_tiles(bake, bake->targets[index].charts, number, &tiles, &count, error));
+    VSHI_TRY_DONE(list_tiles(bake->targets[index].charts, (uint64_t)bake->options.shard,
+                             (uint64_t)bake->options.shard_count, number, &tiles, &count, error));
     if (count == 0) {
         goto done;
     }
-    VSHI_TRY_DONE(vshi_allocate((void **)&bytes, MOST_TILE_BYTES, 1, "part", error));
     VSHI_TRY_DONE(vshi_page_group_open(bake, index, 1, &group, error));
     vshi_scene_page *page = group.pages;
     result = vshi_trace_tiles(bake->tracer, &page->page, tiles, count, tiles_done, error);
     VSHI_TRY_DONE(vshi_name_file(page->target->receiver.path, result, error));
     bake->report.bake_s += vshi_seconds() - start;
     for (size_t i = 0; i < count; ++i) {
-        write_tile(file, page, tiles[i], bytes);
+        VSHI_TRY_DONE(move_tile(file, page, tiles[i], error));
         add_to_report(bake, page, tiles[i]);
     }
 done:
     vshi_page_group_close(&group);
-    free(bytes);
     free(tiles);
     return result;
 }
 
+static vsh_result write_part(vshi_scene_bake *bake, part_file *f, vshi_job *tiles, vsh_error *error) {
+    uint64_t number = 0;
+    VSHI_TRY(write_head(bake, f, error));
+    for (size_t i = 0; i < bake->target_count; ++i) {
+        VSHI_TRY(bake_lightmap(bake, i, &number, f, tiles, error));
+    }
+    uint64_t sum = f->sum;
+    VSHI_TRY(move_bytes(f, &sum, sizeof sum, error));
+    FILE *file = f->file;
+    f->file = NULL;
+    return fclose(file) == 0
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", f->path, strerror(errno));
+}
+
 vsh_result vshi_bake_part(vshi_scene_bake *bake, vsh_error *error) {
     const size_t shards = (size_t)bake->options.shard_count;
-    part_output file = {.sum = VSHI_PART_SUM};
-    uint64_t number = 0;
+    vshi_output output = {.target = NULL};
+    part_file f = {.sum = VSHI_PART_SUM};
     char *path = NULL;
     vsh_result result;
     vshi_job *tiles = vshi_job_begin(&bake->run, "bake", (count_tiles(bake) + shards - 1) / shards);
     VSHI_TRY_DONE(tiles != NULL ? VSH_OK : refuse_memory("part", error));
     VSHI_TRY_DONE(
         name_part(find_parts_name(bake), bake->options.shard, bake->options.shard_count, &path, error));
-    VSHI_TRY_DONE(begin_part(bake, path, &file, error));
-    for (size_t i = 0; i < bake->target_count; ++i) {
-        VSHI_TRY_DONE(bake_lightmap(bake, i, &number, &file, tiles, error));
+    VSHI_TRY_DONE(vshi_output_begin(&output, path, error));
+    f.path = path;
+    f.file = fopen(output.temporary, "wb");
+    if (f.file == NULL) {
+        result = vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", path, strerror(errno));
+        goto done;
     }
-    const double baked = vshi_seconds();
-    result = finish_part(&file, error);
-    bake->report.write_s += vshi_seconds() - baked;
+    VSHI_TRY_DONE(write_part(bake, &f, tiles, error));
+    result = vshi_output_commit(&output, error);
 done:
-    if (file.file != NULL) {
-        fclose(file.file);
-    }
-    vshi_output_abandon(&file.output);
+    close_file(&f);
+    vshi_output_abandon(&output);
     vshi_job_end(tiles);
     free(path);
     return result;
@@ -579,175 +427,91 @@ done:
 /* --- reading */
 
 enum { MOST_HEAD = 1 << 28, CHUNK = 1 << 20 }; /* bytes; read at once */
-enum { IN_MEMORY = 1 + sizeof(char *) };       /* bytes of a head's byte, which may be a text */
 
-typedef struct part {
-    char *path;
-    FILE *file; /* NULL: closed */
-    part_head head;
-    uint64_t at, end; /* of the remaining tiles, bytes of the file */
-} part;
-
-struct vshi_parts {
-    part *list; /* [count] */
-    size_t count;
-    uint64_t number; /* of the next lightmap's first tile */
-};
-
-static void close_part(part *p) {
-    if (p->file != NULL) {
-        fclose(p->file);
-        p->file = NULL;
-    }
-}
-
-static void free_part(part *p) {
-    close_part(p);
-    free_head(&p->head);
-    free(p->path);
-}
-
-void vshi_parts_free(vshi_parts *parts) {
-    for (size_t i = 0; parts != NULL && parts->list != NULL && i < parts->count; ++i) {
-        free_part(&parts->list[i]);
-    }
-    if (parts != NULL) {
-        free(parts->list);
-        free(parts);
-    }
-}
-
-static vsh_result read_bytes(const part *p, void *bytes, size_t size, vsh_error *error) {
-    return size == 0 || fread(bytes, size, 1, p->file) == 1
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", p->path,
-                           ferror(p->file) ? strerror(errno) : "it ends early");
-}
-
-/* Reads the front of a file of `size` bytes. Checks that it is a part, and has the size that it claims. */
-static vsh_result read_front(const part *p, uint64_t size, vshi_part_front *front, vsh_error *error) {
-    const bool whole = size >= sizeof *front + sizeof(uint64_t);
+/* Opens a part and reads what is before its texts. Checks that it is a part, and has room for the texts. */
+static vsh_result open_part(const char *path, part_file *f, vshi_part_front *front, uint64_t *size,
+                            vsh_error *error) {
+    const size_t least = sizeof *front + sizeof(uint64_t);
+    *f = (part_file){.path = path, .reads = true};
     *front = (vshi_part_front){.order = 0};
-    VSHI_TRY(read_bytes(p, front, whole ? sizeof *front : (size_t)size, error));
+    VSHI_TRY(vshi_input_open(path, path, UINT64_MAX / 2, &f->file, size, error));
+    VSHI_TRY(move_bytes(f, front, *size < least ? (size_t)*size : sizeof *front, error));
     if (memcmp(front->magic, VSHI_PART_MAGIC_BEGIN, strlen(VSHI_PART_MAGIC_BEGIN)) != 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is not a part of a bake", p->path);
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is not a part of a bake", path);
     }
-    if (!whole) {
-        return fail_damaged(p->path, "it ends early", error);
-    }
-    if (memcmp(front->magic, VSHI_PART_MAGIC, sizeof front->magic) != 0 || front->order != VSHI_PART_ORDER) {
+    if (*size >= least && (memcmp(front->magic, VSHI_PART_MAGIC, sizeof front->magic) != 0 ||
+                           front->order != VSHI_PART_ORDER)) {
         return vshi_fail(error, VSH_ERROR_INPUT,
                          "%s: is of another version of vdbshade, or of another kind of machine; bake this "
                          "part again",
-                         p->path);
+                         path);
     }
-    const uint64_t rest = size - sizeof *front - sizeof(uint64_t);
-    return front->head_bytes <= rest && front->head_bytes % ROUND == 0 && rest % 4 == 0
-               ? VSH_OK
-               : fail_damaged(p->path, "its size does not fit its head", error);
-}
-
-/* Opens a part and reads its head, up to the tiles; *sum becomes the checksum so far. */
-static vsh_result open_part(part *p, const vsh_run *run, uint64_t *sum, vsh_error *error) {
-    uint64_t size;
-    vshi_part_front front;
-    part_head *head = &p->head;
-    VSHI_TRY(vshi_input_open(p->path, p->path, UINT64_MAX / 2, &p->file, &size, error));
-    VSHI_TRY(read_front(p, size, &front, error));
-    if (front.head_bytes > MOST_HEAD) {
-        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its head has %" PRIu64 " bytes, at most %d", p->path,
-                         front.head_bytes, MOST_HEAD);
+    if (*size < least || front->head_bytes > *size - least) {
+        return fail_damaged(path, "it ends early", error);
     }
-    head->size = (size_t)front.head_bytes;
-    VSHI_TRY(vshi_check_limit(run, IN_MEMORY * (double)head->size, p->path, error));
-    VSHI_TRY(vshi_allocate((void **)&head->bytes, head->size, 1, p->path, error));
-    VSHI_TRY(read_bytes(p, head->bytes, head->size, error));
-    *sum = vshi_part_sum(vshi_part_sum(VSHI_PART_SUM, &front, sizeof front), head->bytes, head->size);
-    p->at = sizeof front + head->size;
-    p->end = size - sizeof(uint64_t);
-    VSHI_TRY(parse_head(p->path, head, error));
-    return head->numbers.shard >= 1 && head->numbers.shard <= head->numbers.shard_count
+    return front->head_bytes <= MOST_HEAD
                ? VSH_OK
-               : fail_damaged(p->path, "its number", error);
+               : vshi_fail(error, VSH_ERROR_LIMIT, "%s: its head has %" PRIu64 " bytes, at most %d", path,
+                           front->head_bytes, MOST_HEAD);
 }
 
 /* Reads over the tiles and checks the sum of all bytes. */
-static vsh_result check_sum(const part *p, uint64_t sum, const vsh_run *run, vsh_error *error) {
+static vsh_result check_sum(part_file *f, const vshi_part_front *front, const char *texts, uint64_t size,
+                            const vsh_run *run, vsh_error *error) {
+    uint64_t left = size - sizeof *front - front->head_bytes - sizeof(uint64_t), written;
+    uint64_t sum = vshi_part_sum(VSHI_PART_SUM, front, sizeof *front);
     unsigned char *chunk = NULL;
-    uint64_t written;
     vsh_result result;
-    vshi_job *job = vshi_job_begin(run, "parts", (size_t)((p->end - p->at) / CHUNK) + 1);
-    VSHI_TRY_DONE(job != NULL ? VSH_OK : refuse_memory(p->path, error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&chunk, CHUNK, 1, p->path, error));
-    for (uint64_t left = p->end - p->at; left > 0;) {
-        const size_t size = left < CHUNK ? (size_t)left : CHUNK;
-        VSHI_TRY_DONE(read_bytes(p, chunk, size, error));
-        sum = vshi_part_sum(sum, chunk, size);
-        left -= size;
+    vshi_job *job = vshi_job_begin(run, "parts", (size_t)(left / CHUNK) + 1);
+    VSHI_TRY_DONE(job != NULL ? VSH_OK : refuse_memory(f->path, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&chunk, CHUNK, 1, f->path, error));
+    sum = vshi_part_sum(sum, texts, (size_t)front->head_bytes);
+    while (left > 0) {
+        const size_t count = left < CHUNK ? (size_t)left : CHUNK;
+        VSHI_TRY_DONE(move_bytes(f, chunk, count, error));
+        sum = vshi_part_sum(sum, chunk, count);
+        left -= count;
         VSHI_TRY_DONE(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
     }
-    VSHI_TRY_DONE(read_bytes(p, &written, sizeof written, error));
-    result = written == sum ? VSH_OK : fail_damaged(p->path, "its checksum does not match", error);
+    VSHI_TRY_DONE(move_bytes(f, &written, sizeof written, error));
+    result = written == sum ? VSH_OK : fail_damaged(f->path, "its checksum does not match", error);
 done:
     free(chunk);
     vshi_job_end(job);
     return result;
 }
 
-/* --- parts that belong together */
+/* Returns the next of the texts before `end`, which a NUL ends; NULL: there is none. */
+static const char *next_text(const char **at, const char *end) {
+    const char *text = *at;
+    *at = text < end ? text + strlen(text) + 1 : end;
+    return text < end ? text : NULL;
+}
 
-static vsh_result check_attributes(const part *p, const part_head *own, vsh_error *error) {
-    const uint64_t count = own->numbers.attributes, theirs = p->head.numbers.attributes;
-    for (uint64_t i = 0; i < count || i < theirs; ++i) {
-        const char *const *a = i < theirs ? p->head.attributes + 2 * i : NULL;
-        const char *const *b = i < count ? own->attributes + 2 * i : NULL;
-        if (a == NULL || b == NULL || strcmp(a[0], b[0]) != 0 || strcmp(a[1], b[1]) != 0) {
+/* Fails if attributes differ from the job's. `at` are the part's names and values. */
+static vsh_result check_attributes(const char *path, const char *at, const char *end,
+                                   const vshi_scene_bake *bake, vsh_error *error) {
+    size_t count;
+    const vsh_attribute *own = vsh_provenance_attributes(bake->provenance, &count);
+    const char *name = "", *value;
+    for (size_t i = 0; i < count || name != NULL; ++i) {
+        name = next_text(&at, end);
+        value = next_text(&at, end);
+        if (i < count ? name == NULL || value == NULL || strcmp(name, own[i].name) != 0 ||
+                            strcmp(value, own[i].value) != 0
+                      : name != NULL) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "%s: is of other inputs or options: its %s is '%.160s', of the others or here "
                              "'%.160s'; bake this part again",
-                             p->path, b != NULL ? b[0] : a[0], a != NULL ? a[1] : "", b != NULL ? b[1] : "");
+                             path, i < count ? own[i].name : name, value != NULL ? value : "",
+                             i < count ? own[i].value : "");
         }
     }
     return VSH_OK;
 }
 
-/* Whether the lightmaps, the channels and the casters are the same. The attributes name every input and
- * option, so these differ only if a part's head was altered. */
-static bool is_alike(const part_head *a, const part_head *b) {
-    const head_numbers *m = &a->numbers, *n = &b->numbers;
-    bool alike = m->lightmaps == n->lightmaps && m->channels == n->channels && m->errors == n->errors &&
-                 m->voxel_size == n->voxel_size && m->has_triangles == n->has_triangles &&
-                 m->active_voxels == n->active_voxels && m->levels == n->levels &&
-                 m->layered_ao == n->layered_ao;
-    alike = alike && memcmp(a->lightmaps, b->lightmaps, m->lightmaps * sizeof *a->lightmaps) == 0;
-    for (uint64_t c = 0; alike && c < m->channels; ++c) {
-        alike = strcmp(a->channels[c], b->channels[c]) == 0;
-    }
-    return alike;
-}
-
-/* Checks that a part has the head `own`, which is made of the job's inputs and the first part's casters. */
-static vsh_result check_part(const part *p, const part_head *own, int32_t shard, int32_t count,
-                             vsh_error *error) {
-    const head_numbers *n = &p->head.numbers;
-    if (strcmp(p->head.texts[0], VSHI_VERSION) != 0) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: is of vdbshade %.32s, this is %s; bake this part again",
-                         p->path, p->head.texts[0], VSHI_VERSION);
-    }
-    if (n->shard != shard || n->shard_count != count) {
-        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds part %d of %d; was it renamed?", p->path,
-                         n->shard, n->shard_count);
-    }
-    VSHI_TRY(check_attributes(p, own, error));
-    return is_alike(&p->head, own) ? VSH_OK
-                                   : vshi_fail(error, VSH_ERROR_INPUT,
-                                               "%s: its lightmaps, channels or voxels are not those of the "
-                                               "other parts or of the scene; bake this part again",
-                                               p->path);
-}
-
 /* Reports the casters of the parts, which a merge does not make. */
-static vsh_result report_casters(vshi_scene_bake *bake, const head_numbers *n, vsh_error *error) {
+static vsh_result report_casters(vshi_scene_bake *bake, const vshi_part_front *n, vsh_error *error) {
     vsh_occluders_info *casters = &bake->report.occluders;
     casters->voxel_size = n->voxel_size;
     casters->has_triangles = n->has_triangles;
@@ -758,70 +522,118 @@ static vsh_result report_casters(vshi_scene_bake *bake, const head_numbers *n, v
     return vshi_bake_find_provenance(bake, error);
 }
 
+/* Checks the head of a part, with its texts, and that it is part `shard` of the job. */
+static vsh_result check_head(vshi_scene_bake *bake, const char *path, const vshi_part_front *front,
+                             const char *texts, int32_t shard, int32_t count, vsh_error *error) {
+    const char *end = texts + front->head_bytes, *at = texts;
+    uint64_t layout;
+    if (front->shard != shard || front->shard_count != count) {
+        return vshi_fail(error, VSH_ERROR_INPUT, "%s: holds part %d of %d; was it renamed?", path,
+                         front->shard, front->shard_count);
+    }
+    if (shard == 1) {
+        VSHI_TRY(report_casters(bake, front, error));
+    }
+    for (uint64_t i = 0; i < front->words && at < end; ++i) {
+        next_text(&at, end);
+    }
+    VSHI_TRY(check_attributes(path, at, end, bake, error));
+    VSHI_TRY(hash_layout(bake, &layout, error));
+    return front->layout == layout
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_INPUT,
+                           "%s: its lightmaps, channels or voxels are not those of the other parts or of the "
+                           "scene; bake this part again",
+                           path);
+}
+
+/* The part of a merge. */
+typedef struct part {
+    char *path;
+    off_t at; /* of the next tile */
+} part;
+
+struct vshi_parts {
+    part *list; /* [count] */
+    size_t count;
+    uint64_t number; /* of the next lightmap's first tile */
+};
+
+void vshi_parts_free(vshi_parts *parts) {
+    for (size_t i = 0; parts != NULL && parts->list != NULL && i < parts->count; ++i) {
+        free(parts->list[i].path);
+    }
+    if (parts != NULL) {
+        free(parts->list);
+        free(parts);
+    }
+}
+
 vsh_result vshi_parts_find(const vshi_scene_bake *bake, int32_t *count, vsh_error *error) {
     *count = bake->options.shard_count;
-    if (*count == 0) {
-        VSHI_TRY(count_shards(find_parts_name(bake), count, error));
-    }
-    return check_all_there(find_parts_name(bake), *count, error);
+    return find_parts(find_parts_name(bake), count, error);
+}
+
+static vsh_result check_part(vshi_scene_bake *bake, part *p, int32_t shard, int32_t count, vsh_error *error) {
+    part_file f;
+    vshi_part_front front;
+    uint64_t size;
+    char *texts = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(open_part(p->path, &f, &front, &size, error));
+    VSHI_TRY_DONE(vshi_check_limit(&bake->run, (double)front.head_bytes, p->path, error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&texts, (size_t)front.head_bytes + 1, 1, p->path, error));
+    VSHI_TRY_DONE(move_bytes(&f, texts, (size_t)front.head_bytes, error));
+    p->at = ftello(f.file);
+    VSHI_TRY_DONE(check_sum(&f, &front, texts, size, &bake->run, error));
+    result = check_head(bake, p->path, &front, texts, shard, count, error);
+done:
+    close_file(&f);
+    free(texts);
+    return result;
 }
 
 vsh_result vshi_parts_open(vshi_scene_bake *bake, int32_t count, vsh_error *error) {
     const double start = vshi_seconds();
-    part_head own = {.bytes = NULL};
-    vshi_parts *parts = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&parts, 1, sizeof *parts, "parts", error));
-    bake->parts = parts;
+    VSHI_TRY(vshi_allocate((void **)&bake->parts, 1, sizeof *bake->parts, "parts", error));
+    vshi_parts *parts = bake->parts;
     parts->count = (size_t)count;
-    VSHI_TRY_DONE(vshi_allocate((void **)&parts->list, parts->count, sizeof *parts->list, "parts", error));
+    VSHI_TRY(vshi_allocate((void **)&parts->list, parts->count, sizeof *parts->list, "parts", error));
     for (int32_t i = 0; i < count; ++i) {
         part *p = &parts->list[i];
-        uint64_t sum = 0;
-        VSHI_TRY_DONE(name_part(find_parts_name(bake), i + 1, count, &p->path, error));
-        VSHI_TRY_DONE(open_part(p, &bake->run, &sum, error));
-        VSHI_TRY_DONE(check_sum(p, sum, &bake->run, error));
-        close_part(p);
-        if (i == 0) {
-            VSHI_TRY_DONE(report_casters(bake, &p->head.numbers, error));
-            VSHI_TRY_DONE(make_head(bake, &own, error));
-        }
-        VSHI_TRY_DONE(check_part(p, &own, i + 1, count, error));
+        VSHI_TRY(name_part(find_parts_name(bake), i + 1, count, &p->path, error));
+        VSHI_TRY(check_part(bake, p, i + 1, count, error));
     }
     bake->report.load_s += vshi_seconds() - start;
-done:
-    free_head(&own);
-    return result;
+    return VSH_OK;
 }
 
 /* --- words of a part */
 
-/* Copies the words into one block: their list with a NULL at its end, then the texts. */
-static vsh_result copy_words(const part *p, char ***words, vsh_error *error) {
-    const size_t count = (size_t)p->head.numbers.words;
-    size_t texts = 0;
-    for (size_t i = 0; i < count; ++i) {
-        texts += strlen(p->head.words[i]) + 1;
+/* Reads the words into one block: their list, with a NULL at its end, and the texts. */
+static vsh_result read_words(const char *path, const vsh_run *run, char ***words, size_t *count,
+                             vsh_error *error) {
+    part_file f;
+    vshi_part_front front;
+    uint64_t size;
+    vsh_result result;
+    VSHI_TRY_DONE(open_part(path, &f, &front, &size, error));
+    const double bytes = (double)front.words * sizeof **words + (double)front.head_bytes;
+    VSHI_TRY_DONE(front.words <= front.head_bytes ? VSH_OK : fail_damaged(path, "its head", error));
+    VSHI_TRY_DONE(vshi_check_limit(run, bytes, path, error));
+    const size_t list = ((size_t)front.words + 1) * sizeof **words, texts = (size_t)front.head_bytes;
+    VSHI_TRY_DONE(vshi_allocate((void **)words, list + texts + 1, 1, path, error));
+    char *const first = (char *)*words + list;
+    const char *at = first;
+    VSHI_TRY_DONE(move_bytes(&f, first, texts, error));
+    for (; *count < front.words; ++*count) {
+        const char *text = next_text(&at, first + texts);
+        VSHI_TRY_DONE(text != NULL ? VSH_OK : fail_damaged(path, "its head", error));
+        (*words)[*count] = first + (text - first);
     }
-    VSHI_TRY(vshi_allocate((void **)words, (count + 1) * sizeof **words + texts, 1, p->path, error));
-    char *text = (char *)(*words + count + 1);
-    for (size_t i = 0; i < count; ++i) {
-        (*words)[i] = text;
-        text = stpcpy(text, p->head.words[i]) + 1;
-    }
-    return VSH_OK;
-}
-
-/* Names the existing part with the lowest number, else the last one. */
-static vsh_result find_first_part(const char *parts, int32_t count, char **path, vsh_error *error) {
-    for (int32_t i = 1; i < count; ++i) {
-        VSHI_TRY(name_part(parts, i, count, path, error));
-        if (access(*path, F_OK) == 0) {
-            return VSH_OK;
-        }
-        free(*path);
-    }
-    return name_part(parts, count, count, path, error);
+done:
+    close_file(&f);
+    return result;
 }
 
 vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run *run, char ***words,
@@ -837,16 +649,16 @@ vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run 
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "shard_count %d: expected 0 to %d", shard_count,
                          VSHI_MOST_SHARDS);
     }
-    if (shard_count == 0) {
-        VSHI_TRY(count_shards(parts, &shard_count, error));
+    char *path;
+    VSHI_TRY(find_parts(parts, &shard_count, error));
+    VSHI_TRY(name_part(parts, 1, shard_count, &path, error));
+    const vsh_result result = read_words(path, &full, words, count, error);
+    if (result != VSH_OK) {
+        vsh_part_words_free(*words);
+        *words = NULL;
+        *count = 0;
     }
-    part p = {.path = NULL};
-    uint64_t sum;
-    VSHI_TRY(find_first_part(parts, shard_count, &p.path, error));
-    vsh_result result = open_part(&p, &full, &sum, error);
-    result = result == VSH_OK ? copy_words(&p, words, error) : result;
-    *count = result == VSH_OK ? (size_t)p.head.numbers.words : 0;
-    free_part(&p);
+    free(path);
     return result;
 }
 
@@ -854,132 +666,44 @@ void vsh_part_words_free(char **words) {
     free(words);
 }
 
-/* --- reading tiles */
+/* --- tiles of a merge */
 
-/* Reads a part's tiles of the current lightmap. */
-typedef struct tile_reader {
-    part *part;
-    vshi_scene_page *page;
-    unsigned char *bytes; /* [MOST_TILE_BYTES] */
-} tile_reader;
-
-/* Opens a part at its next tile. */
-static vsh_result reopen_part(part *p, vsh_error *error) {
-    uint64_t size;
-    VSHI_TRY(vshi_input_open(p->path, p->path, UINT64_MAX / 2, &p->file, &size, error));
-    return fseeko(p->file, (off_t)p->at, SEEK_SET) == 0
-               ? VSH_OK
-               : vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", p->path, strerror(errno));
-}
-
-static vsh_result read_next(const tile_reader *r, void *bytes, size_t size, vsh_error *error) {
-    if (size > r->part->end - r->part->at) {
-        return fail_damaged(r->part->path, "its tiles", error);
+/* Reads the tiles that part `index` has of the lightmap. */
+static vsh_result read_tiles(vshi_parts *parts, size_t index, const vshi_scene_page *page, vshi_job *job,
+                             vsh_error *error) {
+    part *p = &parts->list[index];
+    part_file f = {.path = p->path, .reads = true};
+    uint64_t number = parts->number, size;
+    uint32_t *tiles = NULL;
+    size_t count;
+    vsh_result result;
+    VSHI_TRY_DONE(list_tiles(page->target->charts, index + 1, parts->count, &number, &tiles, &count, error));
+    VSHI_TRY_DONE(vshi_input_open(p->path, p->path, UINT64_MAX / 2, &f.file, &size, error));
+    if (fseeko(f.file, p->at, SEEK_SET) != 0) {
+        result = vshi_fail(error, VSH_ERROR_READ, "%s: cannot be read: %s", p->path, strerror(errno));
+        goto done;
     }
-    r->part->at += size;
-    return read_bytes(r->part, bytes, size, error);
-}
-
-static vsh_result read_held(const tile_reader *r, vshi_shots *shots, size_t tile, uint32_t count,
-                            vsh_error *error) {
-    if (count == 0) {
-        return VSH_OK;
-    }
-    if (shots->held == NULL || shots->held[tile].list != NULL || count > VSHI_TILE * VSHI_TILE) {
-        return fail_damaged(r->part->path, "its tiles", error);
-    }
-    vshi_held_texels *held = &shots->held[tile];
-    VSHI_TRY(vshi_allocate((void **)&held->list, count, sizeof *held->list, r->part->path, error));
-    held->count = count;
-    return read_next(r, held->list, count * sizeof *held->list, error);
-}
-
-static vsh_result read_tile(const tile_reader *r, const vshi_part_tile *head, vsh_error *error) {
-    vshi_page *p = &r->page->page;
-    const size_t tile = head->tile;
-    const place at = find_place(r->page, tile);
-    tile_array arrays[MOST_ARRAYS];
-    const size_t count = list_arrays(r->page, arrays);
-    VSHI_TRY(read_next(r, &p->stats[tile], sizeof *p->stats, error));
-    VSHI_TRY(read_next(r, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors, error));
     for (size_t i = 0; i < count; ++i) {
-        VSHI_TRY(read_next(r, r->bytes, count_bytes(&arrays[i], &at), error));
-        copy_tile(r->page, &arrays[i], &at, r->bytes, true);
+        VSHI_TRY_DONE(move_tile(&f, page, tiles[i], error));
+        VSHI_TRY_DONE(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
     }
-    VSHI_TRY(read_held(r, &p->ao, tile, head->held[0], error));
-    return read_held(r, &p->sky, tile, head->held[1], error);
+    p->at = ftello(f.file);
+    parts->number = index + 1 == parts->count ? number : parts->number;
+done:
+    close_file(&f);
+    free(tiles);
+    return result;
 }
 
-/* owner[tile] is 1 + the tile's part, 0 without texels. This bit marks tiles that were read. */
-#define WAS_READ UINT32_C(0x80000000)
-
-/* Reads the tiles that a part has of the lightmap. */
-static vsh_result read_part_tiles(const tile_reader *r, uint32_t *owner, uint32_t number, vshi_job *job,
-                                  vsh_error *error) {
-    const vshi_target *target = r->page->target;
-    const size_t tiles = vshi_charts_tiles(&target->charts->sorted);
-    while (r->part->at < r->part->end) {
-        vshi_part_tile head;
-        VSHI_TRY(read_next(r, &head, sizeof head, error));
-        if (head.lightmap > target->index) {
-            r->part->at -= sizeof head;
-            return VSH_OK;
-        }
-        if (head.lightmap < target->index || head.tile >= tiles || owner[head.tile] != number + 1) {
-            return fail_damaged(r->part->path, "its tiles", error);
-        }
-        owner[head.tile] |= WAS_READ;
-        VSHI_TRY(read_tile(r, &head, error));
-        VSHI_TRY(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
-    }
-    return VSH_OK;
-}
-
-/* Tiles that were read, to be rasterized and checked. */
-typedef struct checking {
-    const vshi_parts *parts;
-    vshi_scene_page *page;
-    const uint32_t *owner;
-} checking;
-
-static vsh_result check_tile(void *user, size_t tile, vsh_error *error) {
-    const checking *c = user;
-    if (c->owner[tile] == 0) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_page_rasterize(&c->page->page, tile, error));
-    return check_tile_values(c->page, tile, c->parts->list[(c->owner[tile] & ~WAS_READ) - 1].path, error);
+static vsh_result rasterize_tile(void *user, size_t tile, vsh_error *error) {
+    vshi_scene_page *page = user;
+    return page->target->charts->samples[tile] > 0 ? vshi_page_rasterize(&page->page, tile, error) : VSH_OK;
 }
 
 vsh_result vshi_parts_read(vshi_parts *parts, vshi_scene_page *page, vshi_job *job, vsh_error *error) {
-    const vsh_charts *charts = page->target->charts;
-    const size_t tiles = vshi_charts_tiles(&charts->sorted);
-    uint32_t *owner = NULL;
-    unsigned char *bytes = NULL;
-    const vshi_array arrays[] = {VSHI_ARRAY(owner, tiles), VSHI_ARRAY(bytes, MOST_TILE_BYTES)};
-    vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "parts", error));
-    for (size_t tile = 0; tile < tiles; ++tile) {
-        if (charts->samples[tile] > 0) {
-            owner[tile] = (uint32_t)find_owner(charts, parts->number++, parts->count) + 1;
-        }
-    }
     for (size_t i = 0; i < parts->count; ++i) {
-        const tile_reader reader = {.part = &parts->list[i], .page = page, .bytes = bytes};
-        result = reopen_part(reader.part, error);
-        result = result == VSH_OK ? read_part_tiles(&reader, owner, (uint32_t)i, job, error) : result;
-        close_part(reader.part);
-        VSHI_TRY_DONE(result);
+        VSHI_TRY(read_tiles(parts, i, page, job, error));
     }
-    for (size_t tile = 0; tile < tiles; ++tile) {
-        if (owner[tile] != 0 && (owner[tile] & WAS_READ) == 0) {
-            VSHI_TRY_DONE(fail_damaged(parts->list[owner[tile] - 1].path, "a tile is missing", error));
-        }
-    }
-    checking c = {.parts = parts, .page = page, .owner = owner};
-    result = vshi_parallel_each(job, tiles, 1, 0, check_tile, &c, error);
-done:
-    free(bytes);
-    free(owner);
-    return result;
+    const size_t tiles = vshi_charts_tiles(&page->target->charts->sorted);
+    return vshi_parallel_each(job, tiles, 1, 0, rasterize_tile, page, error);
 }

@@ -98,7 +98,7 @@ static void change(fuzz_input *input, part *p) {
     const uint8_t how = fuzz_byte(input);
     fuzz_fill(input, &place, sizeof place);
     const size_t width = (size_t)1 << how % 4, body = p->size - sizeof(uint64_t);
-    const size_t numbers = sizeof(vshi_part_tile) + sizeof(vsh_shade_stats);
+    const size_t numbers = sizeof(vsh_shade_stats);
     size_t begin = 0, end = body;
     if ((how & 12) == 4 && front.head_bytes < body - sizeof front) {
         end = sizeof front + (size_t)front.head_bytes;
