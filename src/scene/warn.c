@@ -3,11 +3,9 @@
 
 #include "base/job.h"
 #include "geometry/solidity.h"
-#include "light/light.h"
 #include "lightmap/planes.h"
 #include "lightmap/texels.h"
 #include "scene/assets.h"
-#include "trace/embree.h"
 
 #include <inttypes.h>
 #include <math.h>
@@ -52,21 +50,8 @@ static void warn_close(const vshi_target *target, const vsh_uv_report *reports, 
               find_name(&target->lightmap->meshes[close.mesh]), help);
 }
 
-/* The target's size, doubled until it has grown by `least_factor`. */
-static void name_size(const vshi_target *target, double least_factor, char *text, size_t size) {
-    int32_t width = target->receiver.width, height = target->receiver.height;
-    for (double factor = 1.0;
-         factor < least_factor && width <= VSH_MAX_LIGHTMAP_SIZE / 2 && height <= VSH_MAX_LIGHTMAP_SIZE / 2;
-         factor *= 2.0) {
-        width *= 2;
-        height *= 2;
-    }
-    snprintf(text, size, width == height ? "--size %d" : "--size %dx%d", width, height);
-}
-
 static void warn_covered(const vshi_target *target, uint64_t covered, const vsh_run *run) {
     static const double least = 0.2;
-    static const double full = 0.6; /* typical share of charts on a page without padding */
     const vsh_receiver *receiver = &target->receiver;
     const double share = (double)covered / ((double)receiver->width * (double)receiver->height);
     const bool chosen = receiver->objects.only_count > 0 || receiver->objects.except_count > 0;
@@ -74,18 +59,10 @@ static void warn_covered(const vshi_target *target, uint64_t covered, const vsh_
         (target->lightmap->page > 0 && target->object == NULL)) {
         return; /* other objects fill the rest, or it is the last page, which need not be full */
     }
-    char help[128], size[40];
-    if (!target->unwrapped) {
-        name_size(target, sqrt(least / share), size, sizeof size);
-        snprintf(help, sizeof help, "--unwrap always packs them anew, or %s gives them more texels", size);
-    } else if (receiver->texels_per_unit > 0.0) {
-        snprintf(help, sizeof help, "use a smaller --size, or --texels-per-unit %.3g",
-                 receiver->texels_per_unit * sqrt(least / share));
-    } else { /* share = full (1 - padding / size)² */
-        const double padding = 1.0 - sqrt(share / full);
-        name_size(target, padding / (1.0 - sqrt(least / full)), size, sizeof size);
-        snprintf(help, sizeof help, "padding takes most of the image, so use %s", size);
-    }
+    const char *help = !target->unwrapped ? "--unwrap always packs them anew"
+                       : receiver->texels_per_unit > 0.0
+                           ? "use a smaller --size or a higher --texels-per-unit"
+                           : "padding takes most of the image, so use a larger --size";
     vshi_warn(run, "%s: %s%s%scharts cover %.2g %% of %d × %d texels: %s", receiver->path,
               target->object != NULL ? "object '" : "", target->object != NULL ? target->object : "",
               target->object != NULL ? "': " : "", 100.0 * share, receiver->width, receiver->height, help);
@@ -209,11 +186,7 @@ void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const
     }
 }
 
-/* --- hidden lights */
-
-/* One object may hide a light from all others: a sky dome hides the sun, a bulb its own lamp. The shadow
- * planes show which lights are hidden. Rays then find the object. */
-enum { POINTS = 64 /* on each mesh */, RAYS = 16 /* from a point to a light */ };
+/* --- lights that objects hide: a sky dome hides the sun, a bulb its own lamp */
 
 static bool is_same(const vsh_mesh *a, const vsh_mesh *b) {
     return strcmp(find_object(a), find_object(b)) == 0;
@@ -242,96 +215,35 @@ void vshi_note_lit(const vshi_scene_page *page) {
     }
 }
 
-static bool is_in_box(const vshi_triangles *triangles, const double at[3]) {
-    double low[3], high[3], beyond = 0.0;
-    vshi_triangles_bounds(triangles, low, high);
-    for (int k = 0; k < 3; ++k) {
-        beyond = fmax(beyond, fmax(low[k] - at[k], at[k] - high[k]));
-    }
-    return beyond <= vshi_triangles_lift(triangles); /* rounding */
-}
-
-static bool is_facing(const vshi_vec corner[3], vshi_vec at, const vsh_light *light) {
-    const vshi_light_place place = vshi_light_in_world(light);
-    const vshi_vec normal = vshi_cross(vshi_sub(corner[1], corner[0]), vshi_sub(corner[2], corner[0]));
-    vshi_light_view view;
-    return vshi_light_look(&place, at, false, &view) == VSHI_LIGHT_SEEN &&
-           vshi_dot(normal, view.axis) > 0.0 && vshi_light_gain(light, view.axis, view.distance) > 0.0;
-}
-
-/* Whether an object hides a light from all other receivers. Either the lamp or the receivers are in its box:
- * a crate may lie in the shade of a wall, and a house that holds both has several rooms. */
-static bool hides_light(const vsh_mesh *own, size_t parts, vshi_triangles **triangles, const vsh_light *light,
-                        const vshi_scene_bake *bake, const vsh_run *run) {
-    size_t facing = 0;
-    for (size_t t = 0; t < bake->target_count; ++t) {
-        for (size_t m = 0; m < bake->lightmaps[t].mesh_count; ++m) {
-            const vsh_mesh *mesh = &bake->lightmaps[t].meshes[m];
-            const size_t most = is_same(mesh, own) ? 0 : POINTS;
-            const size_t count = mesh->triangle_count < most ? mesh->triangle_count : most;
-            for (size_t k = 0; k < count; ++k) {
-                vshi_vec corner[3];
-                vshi_mesh_triangle(mesh, k * mesh->triangle_count / count, corner);
-                const vshi_vec p = vshi_point_in(corner, k);
-                const double at[3] = {p.x, p.y, p.z};
-                float seen = 1.0f;
-                if (!is_facing(corner, p, light)) {
-                    continue;
-                }
-                if (*triangles == NULL && vshi_triangles_create(own, parts, run, triangles, NULL) != VSH_OK) {
-                    return false; /* no bake fails for a hint */
-                }
-                const bool lamp =
-                    light->type != VSH_LIGHT_DIRECTIONAL && is_in_box(*triangles, light->position);
-                vshi_trace_shadow(*triangles, NULL, 1, at, NULL, 0.0, light, RAYS, run, &seen, NULL);
-                if (seen > 0.0f || is_in_box(*triangles, at) == lamp) {
-                    return false;
-                }
-                ++facing;
-            }
+/* Whether another object than that of a mesh receives. */
+static bool has_others(const vshi_scene_bake *bake, const vsh_mesh *mesh) {
+    bool others = false;
+    for (size_t i = 0; i < bake->target_count; ++i) {
+        for (size_t m = 0; m < bake->lightmaps[i].mesh_count; ++m) {
+            others = others || !is_same(&bake->lightmaps[i].meshes[m], mesh);
         }
     }
-    return facing > 0;
-}
-
-static void find_hidden_lights(const vshi_scene_bake *bake, const vsh_mesh *own, size_t parts,
-                               const vsh_run *run) {
-    const size_t lights = bake->scene.light_count;
-    const char *name = find_object(own);
-    vshi_triangles *triangles = NULL;
-    vsh_light zenith = vsh_light_default();
-    vsh_run quiet = *run;
-    quiet.progress = NULL;
-    quiet.warning = NULL;
-    quiet.memory_held += bake->report.occluders.field_bytes + bake->report.occluders.triangles_bytes;
-    vshi_sky_up(bake->scene.planes.sky, zenith.direction);
-    for (size_t i = 0; i < lights + (bake->scene.planes.sky != VSH_UP_NONE); ++i) {
-        const vsh_light *light = i < lights ? &bake->scene.lights[i] : &zenith;
-        const vsh_mesh *lit = bake->lit[i].mesh;
-        /* the sun may shine on a dome from outside; a lamp that lights its room is not hidden */
-        const bool lights_own = light->type == VSH_LIGHT_DIRECTIONAL && lit != NULL && is_same(lit, own);
-        if (!bake->lit[i].several && (lit == NULL || lights_own) &&
-            hides_light(own, parts, &triangles, light, bake, &quiet)) {
-            vshi_warn(run, "'%s' hides %s%s from all other objects; --no-cast '%s' lets it through", name,
-                      i < lights ? "light " : "the sky", i < lights ? light->name : "", name);
-        }
-    }
-    vshi_triangles_free(triangles);
+    return others;
 }
 
 void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run) {
-    if (run->warning == NULL) {
-        return;
-    }
-    for (size_t i = 0; i < bake->scene.caster_count; ++i) {
-        const vsh_caster *caster = &bake->scene.casters[i];
-        size_t count = 0;
-        const vsh_mesh *meshes = vsh_assets_caster(bake->assets, i, &count);
-        count = caster->type == VSH_CASTER_MESH && caster->layer == NULL ? count : 0;
-        for (size_t first = 0, next; first < count; first = next) {
-            for (next = first + 1; next < count && is_same(&meshes[next], &meshes[first]); ++next) {
-            }
-            find_hidden_lights(bake, &meshes[first], next - first, run);
+    const size_t lights = bake->scene.light_count;
+    for (size_t i = 0; i < lights + (bake->scene.planes.sky != VSH_UP_NONE); ++i) {
+        const vsh_mesh *lit = bake->lit[i].mesh;
+        const char *what = i < lights ? "light " : "the sky",
+                   *name = i < lights ? bake->scene.lights[i].name : "";
+        const bool is_far = i == lights || bake->scene.lights[i].type == VSH_LIGHT_DIRECTIONAL;
+        if (lit == NULL) {
+            vshi_warn(
+                run,
+                "%s%s reaches no texel; if an object hides it, such as a sky dome or the bulb of a lamp, "
+                "--no-cast NAME lets it through",
+                what, name);
+        } else if (!bake->lit[i].several && is_far && has_others(bake, lit)) {
+            vshi_warn(
+                run,
+                "%s%s reaches '%s' alone; if that hides it from the others, --no-cast '%s' lets it through",
+                what, name, find_object(lit), find_object(lit));
         }
     }
 }
