@@ -296,7 +296,7 @@ static vsh_grid_options choose_grid_options(const vsh_scene *scene, const vsh_sc
 /* Voxelises the union of the selected casters. */
 static vsh_result voxelise(const selection *of, const vsh_grid_options *options, const vsh_run *run,
                            vsh_grid **grid, vsh_error *error) {
-    const size_t casters = of->scene->caster_count, meshes = vshi_assets_mesh_count(of->assets);
+    const size_t casters = of->scene->caster_count, meshes = vshi_assets_set(of->assets)->count;
     assembly a = {.of = of,
                   .low = {INFINITY, INFINITY, INFINITY},
                   .high = {-INFINITY, -INFINITY, -INFINITY},
@@ -449,7 +449,7 @@ static vsh_result trace_casters(const selection *of, const vsh_run *run, vshi_tr
                                 vshi_solids **solids, vsh_error *error) {
     vshi_solids *made = NULL;
     traced t = {.mesh_count = 0};
-    const size_t casters = of->scene->caster_count, meshes = vshi_assets_mesh_count(of->assets) + casters + 1;
+    const size_t casters = of->scene->caster_count, meshes = vshi_assets_set(of->assets)->count + casters + 1;
     size_t balls = 0;
     for (size_t i = 0; i < casters; ++i) {
         const vshi_spheres *spheres = vshi_assets_caster(of->assets, i)->spheres;

@@ -796,8 +796,8 @@ const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t inde
     return index < assets->caster_count ? &assets->casters[index] : &none;
 }
 
-size_t vshi_assets_mesh_count(const vsh_assets *assets) {
-    return assets->set.count;
+const vshi_mesh_set *vshi_assets_set(const vsh_assets *assets) {
+    return &assets->set;
 }
 
 const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t *mesh_count) {
@@ -806,61 +806,20 @@ const vsh_mesh *vsh_assets_caster(const vsh_assets *assets, size_t index, size_t
     return place->meshes;
 }
 
-const vshi_heights *vshi_assets_heights(const vsh_assets *assets, size_t index) {
-    return vshi_assets_caster(assets, index)->heights;
-}
-
-const vshi_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index) {
-    const vshi_asset_place *place = vshi_assets_caster(assets, index);
-    return place->direct ? place->spheres : NULL;
-}
-
-static const vshi_asset_place *find_receiver(const vsh_assets *assets, size_t index) {
+const vshi_asset_place *vshi_assets_receiver(const vsh_assets *assets, size_t index) {
     static const vshi_asset_place none;
     return index < assets->receiver_count ? &assets->receivers[index] : &none;
 }
 
 const vsh_mesh *vsh_assets_receiver(const vsh_assets *assets, size_t index, size_t *mesh_count) {
-    const vshi_asset_place *place = find_receiver(assets, index);
+    const vshi_asset_place *place = vshi_assets_receiver(assets, index);
     *mesh_count = place->count;
     return place->meshes;
 }
 
-const vsh_model *vshi_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const vshi_asset_place *place = find_receiver(assets, index);
-    *numbers = place->numbers;
-    return place->made != NULL ? place->made : place->model;
-}
-
-const vsh_atlas *vshi_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers) {
-    const vshi_receiver_pages *pages = &find_receiver(assets, index)->pages;
-    *numbers = pages->atlas_numbers;
-    return pages->atlas;
-}
-
-size_t vshi_assets_receiver_pages(const vsh_assets *assets, size_t index) {
-    return find_receiver(assets, index)->pages.count;
-}
-
-int32_t vshi_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
-                                       vshi_receiver_page *info) {
-    const vshi_receiver_pages *pages = &find_receiver(assets, index)->pages;
-    if (page >= pages->count) {
-        return 0;
-    }
-    *info = pages->list[page];
-    return 1;
-}
-
-const vsh_mesh *vshi_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
-                                          size_t *mesh_count) {
-    const vshi_asset_place *place = find_receiver(assets, index);
-    const size_t *begins = place->pages.begins;
-    *first = *mesh_count = 0;
-    if (page >= place->pages.count) {
-        return NULL;
-    }
-    *first = begins[page];
-    *mesh_count = begins[page + 1] - begins[page];
+const vsh_mesh *vshi_place_page(const vshi_asset_place *place, size_t page, size_t *first,
+                                size_t *mesh_count) {
+    *first = place->pages.begins[page];
+    *mesh_count = place->pages.begins[page + 1] - *first;
     return place->meshes + *first;
 }

@@ -22,38 +22,12 @@
 vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                   vsh_light **lights, size_t *count, vsh_error *error);
 
-/* The model of receiver `index`, and which of its meshes each of the receiver's is: (*numbers)[mesh_count].
- * They belong to the assets; NULL for an index beyond the scene's. */
-const vsh_model *vshi_assets_receiver_model(const vsh_assets *assets, size_t index, const size_t **numbers);
-
-/* Pages of receiver `index`: 1 but where it is unwrapped and needs more, or has one for each object; 0 beyond
- * the scene's. */
-size_t vshi_assets_receiver_pages(const vsh_assets *assets, size_t index);
-
 /* A page of a receiver; `object` belongs to the assets. */
 typedef struct vshi_receiver_page {
     int32_t width; /* texels */
     int32_t height;
     const char *object; /* the name of the object whose it is, "" where it has none; NULL: it is shared */
 } vshi_receiver_page;
-
-/* Fills *page; false, and nothing changes, beyond what there is. */
-int32_t vshi_assets_receiver_page_info(const vsh_assets *assets, size_t index, size_t page,
-                                       vshi_receiver_page *info);
-
-/* The meshes of vsh_assets_receiver() that lie on page `page`, which are some in a row of them: *first is the
- * place of the first in that list. NULL and a count of 0 beyond what there is. */
-const vsh_mesh *vshi_assets_receiver_page(const vsh_assets *assets, size_t index, size_t page, size_t *first,
-                                          size_t *mesh_count);
-
-/* Where it is unwrapped: its atlas, and which of the atlas's meshes each of vsh_assets_receiver() is, or a
- * part of: (*numbers)[mesh_count]. They belong to the assets. Else NULL. */
-const vsh_atlas *vshi_assets_receiver_atlas(const vsh_assets *assets, size_t index, const size_t **numbers);
-
-/* The heightfield that caster `index` marches, and the spheres that it casts without voxels. They belong to
- * the assets. NULL for every other caster, and beyond the scene's. */
-const vshi_heights *vshi_assets_heights(const vsh_assets *assets, size_t index);
-const vshi_spheres *vshi_assets_spheres(const vsh_assets *assets, size_t index);
 
 /* The same of the casters in `layer`, of its voxel size, or (NULL) of those in none; *grid is NULL where
  * there are none. Errors: as there; VSH_ERROR_ARGUMENT too where the scene has no such layer. */
@@ -135,11 +109,16 @@ typedef struct vshi_asset_place {
     vshi_receiver_pages pages;
 } vshi_asset_place;
 
-/* A caster; all zero beyond the last. */
+/* A caster or receiver; all zero beyond the last. */
 const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t index);
+const vshi_asset_place *vshi_assets_receiver(const vsh_assets *assets, size_t index);
 
-/* Meshes of all casters. */
-size_t vshi_assets_mesh_count(const vsh_assets *assets);
+/* The meshes on page `page` of a receiver: place->meshes from *first on. */
+const vsh_mesh *vshi_place_page(const vshi_asset_place *place, size_t page, size_t *first,
+                                size_t *mesh_count);
+
+/* The meshes of all casters; they are solved. */
+const vshi_mesh_set *vshi_assets_set(const vsh_assets *assets);
 
 /* --- receivers */
 

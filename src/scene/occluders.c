@@ -317,34 +317,6 @@ static vsh_result warn_of_voxels(const vsh_scene *scene, const vsh_assets *asset
     return VSH_OK;
 }
 
-/* Sends notes on the solids and sheets of a layer's casters without voxels. */
-static vsh_result note_solidity(const vsh_scene *scene, const vsh_assets *assets,
-                                const vsh_scene_layer *layer, const vsh_run *run, vsh_error *error) {
-    if (!vshi_wants_notes(run)) {
-        return VSH_OK;
-    }
-    vshi_mesh_set set = {.count = 0};
-    vsh_mesh *meshes;
-    size_t count = 0;
-    vsh_result result;
-    VSHI_TRY_DONE(
-        vshi_allocate((void **)&meshes, vshi_assets_mesh_count(assets), sizeof *meshes, "triangles", error));
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const vshi_asset_place *place = vshi_assets_caster(assets, i);
-        for (size_t m = 0; vshi_caster_has_voxels(scene, &scene->casters[i], layer) && m < place->count;
-             ++m) {
-            meshes[count++] = place->meshes[m];
-        }
-    }
-    VSHI_TRY_DONE(vshi_mesh_set_create(meshes, count, &set, error));
-    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, run, error));
-    vshi_mesh_set_note(&set, 0.0, 0.0, run);
-done:
-    vshi_mesh_set_free(&set);
-    free(meshes);
-    return result;
-}
-
 /* --- occluders */
 
 /* Default distance of points around the casters' box, its diagonals. */
@@ -438,7 +410,10 @@ static vsh_result make_layer_field(making *m, const vsh_scene_layer *layer, cons
     }
     if (resolution == 0 && triangles != NULL && m->options.voxels == 0) {
         VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
-        return *field == NULL ? VSH_OK : note_solidity(m->scene, m->assets, layer, &m->voxel_run, error);
+        if (*field != NULL && layer == NULL) {
+            vshi_mesh_set_note(vshi_assets_set(m->assets), 0.0, 0.0, &m->voxel_run);
+        }
+        return VSH_OK;
     }
     vsh_grid_info voxels;
     VSHI_TRY(create_field(m, layer, resolution, &voxels, field, error));
@@ -504,8 +479,8 @@ static vsh_result add_direct(making *m, size_t index, size_t place, vsh_error *e
     vshi_triangles **triangles = &m->own.layer_triangles[place];
     vsh_field **field = &m->own.layer_fields[place];
     *layer = of != NULL ? make_layer(of) : vshi_layer_default();
-    layer->heights = vshi_assets_heights(m->assets, index);
-    layer->spheres = vshi_assets_spheres(m->assets, index);
+    layer->heights = vshi_assets_caster(m->assets, index)->heights;
+    layer->spheres = vshi_assets_caster(m->assets, index)->spheres;
     if (layer->ao != 0 && bakes_ao(m->scene)) {
         VSHI_TRY(vshi_scene_caster_triangles(m->scene, m->assets, index, &m->run, triangles, error));
         VSHI_TRY(vshi_occluders_unknown(*triangles, 0.0, field, error));

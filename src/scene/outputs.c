@@ -134,8 +134,8 @@ static vsh_result find_solid(vshi_target *target, const vsh_run *run, vsh_error 
 /* Adds a receiver's pages. All pages go into one asset, but each page has its own image. */
 static vsh_result add_pages(vshi_scene_bake *bake, size_t index, vsh_error *error) {
     const vsh_receiver *receiver = &bake->scene.receivers[index];
-    const size_t pages = vshi_assets_receiver_pages(bake->assets, index), *numbers;
-    const bool unwrapped = vshi_assets_receiver_atlas(bake->assets, index, &numbers) != NULL;
+    const vshi_asset_place *place = vshi_assets_receiver(bake->assets, index);
+    const size_t pages = place->pages.count;
     const bool lit = vsh_lit_is_output(receiver->output) != 0;
     if (lit && pages > MOST_LIT_PAGES) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "%s: %zu lightmaps, an asset has at most %d",
@@ -145,18 +145,16 @@ static vsh_result add_pages(vshi_scene_bake *bake, size_t index, vsh_error *erro
         const size_t at = bake->target_count++;
         vshi_target *target = &bake->targets[at];
         vsh_scene_lightmap *lightmap = target->lightmap = &bake->lightmaps[at];
-        vshi_receiver_page info;
+        const vshi_receiver_page info = place->pages.list[page];
         size_t first;
-        vshi_assets_receiver_page_info(bake->assets, index, page, &info);
         *lightmap = (vsh_scene_lightmap){.receiver = index,
                                          .page = page,
                                          .path = receiver->path,
                                          .width = info.width,
                                          .height = info.height};
-        lightmap->meshes =
-            vshi_assets_receiver_page(bake->assets, index, page, &first, &lightmap->mesh_count);
+        lightmap->meshes = vshi_place_page(place, page, &first, &lightmap->mesh_count);
         target->index = at;
-        target->unwrapped = unwrapped;
+        target->unwrapped = place->pages.atlas != NULL;
         target->object = info.object != NULL ? name_object(bake, target, info.object) : NULL;
         target->output = receiver->output != NULL ? name_file(target, pages, receiver->output) : NULL;
         if ((info.object != NULL && target->object == NULL) ||
@@ -179,7 +177,7 @@ static vsh_result add_pages(vshi_scene_bake *bake, size_t index, vsh_error *erro
 vsh_result vshi_list_lightmaps(vshi_scene_bake *bake, vsh_error *error) {
     size_t most = 1;
     for (size_t i = 0; i < bake->scene.receiver_count; ++i) {
-        most += vshi_assets_receiver_pages(bake->assets, i);
+        most += vshi_assets_receiver(bake->assets, i)->pages.count;
     }
     const vshi_array arrays[] = {VSHI_ARRAY(bake->targets, most), VSHI_ARRAY(bake->lightmaps, most)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "lightmaps", error));
@@ -440,22 +438,22 @@ typedef struct asset {
     vsh_lit_options options;
 } asset;
 
-static vsh_result list_meshes(asset *a, const size_t *numbers, const char *output, vsh_error *error) {
-    const vsh_assets *assets = a->bake->assets;
+static vsh_result list_meshes(asset *a, const char *output, vsh_error *error) {
+    const vshi_asset_place *place = vshi_assets_receiver(a->bake->assets, a->receiver);
     const vsh_receiver *receiver = &a->bake->scene.receivers[a->receiver];
-    const size_t all = vsh_model_mesh_count(a->model), *of_atlas;
-    const vsh_atlas *atlas = vshi_assets_receiver_atlas(assets, a->receiver, &of_atlas);
+    const size_t all = vsh_model_mesh_count(a->model);
+    const vsh_atlas *atlas = place->pages.atlas;
     VSHI_TRY(vshi_allocate((void **)&a->meshes, all, sizeof *a->meshes, output, error));
     for (size_t i = 0; i < all; ++i) {
         a->meshes[i].uv_set = -1;
     }
     for (size_t page = 0; page < a->page_count; ++page) {
         size_t first, count;
-        vshi_assets_receiver_page(assets, a->receiver, page, &first, &count);
+        vshi_place_page(place, page, &first, &count);
         for (size_t i = first; i < first + count; ++i) {
-            vsh_lit_mesh *mesh = &a->meshes[numbers[i]];
+            vsh_lit_mesh *mesh = &a->meshes[place->numbers[i]];
             if (atlas != NULL) {
-                const vsh_atlas_mesh v = vsh_atlas_mesh_view(atlas, of_atlas[i]);
+                const vsh_atlas_mesh v = vsh_atlas_mesh_view(atlas, place->pages.atlas_numbers[i]);
                 *mesh = (vsh_lit_mesh){v.uvs,          v.sources,        v.indices, v.charts,
                                        v.vertex_count, v.triangle_count, 0,         0};
                 continue;
@@ -463,7 +461,7 @@ static vsh_result list_meshes(asset *a, const size_t *numbers, const char *outpu
             mesh->page = (uint32_t)page;
             mesh->uv_set = receiver->type != VSH_RECEIVER_MESH ? 0
                            : receiver->uv_set >= 0             ? receiver->uv_set
-                                                               : vsh_model_uv_sets(a->model, numbers[i]) > 1;
+                                                   : vsh_model_uv_sets(a->model, place->numbers[i]) > 1;
         }
     }
     if (atlas == NULL) {
@@ -520,18 +518,18 @@ static vsh_result write_asset(const vshi_scene_bake *bake, size_t index, const v
     const vsh_receiver *receiver = &bake->scene.receivers[index];
     const char *output = receiver->output;
     const char *path = receiver->type == VSH_RECEIVER_MESH ? receiver->path : NULL;
-    const size_t *numbers;
+    const vshi_asset_place *place = vshi_assets_receiver(bake->assets, index);
     asset a = {.bake = bake,
                .receiver = index,
                .pages = pages,
-               .page_count = vshi_assets_receiver_pages(bake->assets, index),
-               .model = vshi_assets_receiver_model(bake->assets, index, &numbers),
+               .page_count = place->pages.count,
+               .model = place->made != NULL ? place->made : place->model,
                .options = vsh_lit_options_default()};
     vsh_run run = bake->run;
     run.progress = NULL; /* writing is a stage of the bake's */
     vsh_result result;
     VSHI_TRY_DONE(list_images(&a, output, error));
-    VSHI_TRY_DONE(list_meshes(&a, numbers, output, error));
+    VSHI_TRY_DONE(list_meshes(&a, output, error));
     a.options.page_names = a.names;
     a.options.page_count = a.page_count;
     a.options.attributes = vsh_provenance_attributes(bake->provenance, &a.options.attribute_count);
@@ -548,7 +546,7 @@ done:
 static vsh_result keep_lit_page(const vshi_scene_page *page, vsh_error *error) {
     vshi_scene_bake *bake = page->bake;
     const vsh_scene_lightmap *lightmap = page->target->lightmap;
-    const size_t pages = vshi_assets_receiver_pages(bake->assets, lightmap->receiver);
+    const size_t pages = vshi_assets_receiver(bake->assets, lightmap->receiver)->pages.count;
     if (lightmap->page == 0) {
         vshi_lit_pages_free(bake);
         VSHI_TRY(vshi_allocate((void **)&bake->lit_pages, pages, sizeof *bake->lit_pages, lightmap->output,
@@ -667,7 +665,7 @@ static vsh_result open_image(const vshi_scene_page *page, bool is_lit, vsh_image
     if (bake->options.rows != NULL || file == NULL) {
         return VSH_OK;
     }
-    const size_t pages = vshi_assets_receiver_pages(bake->assets, lightmap->receiver);
+    const size_t pages = vshi_assets_receiver(bake->assets, lightmap->receiver)->pages.count;
     char *path = is_lit ? name_file(page->target, pages, file) : strdup(file);
     if (path == NULL) {
         return refuse_memory(file, error);

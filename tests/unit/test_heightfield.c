@@ -687,8 +687,8 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &failure));
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     vshi_layer layer = vshi_layer_default();
-    layer.heights = vshi_assets_heights(assets, 0);
-    layer.spheres = vshi_assets_spheres(assets, 0);
+    layer.heights = vshi_assets_caster(assets, 0)->heights;
+    layer.spheres = vshi_assets_caster(assets, 0)->spheres;
     layer.method = VSH_SHADOW_HARD;
     vsh_shade_options shade = preview_options();
     vsh_lightmap_options options = preview_lightmap_options();
