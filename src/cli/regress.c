@@ -414,7 +414,9 @@ static int find_cases(void) {
     size_t kept = 0;
     for (size_t i = 0; i < work.case_count; ++i) {
         if (only == NULL || strstr(work.cases[i].name, only) != NULL) {
-            work.cases[kept++] = work.cases[i];
+            const regress_case one = work.cases[i];
+            work.cases[i] = work.cases[kept]; /* the others stay behind those that are kept */
+            work.cases[kept++] = one;
         }
     }
     work.case_count = kept;

@@ -407,7 +407,9 @@ static int compare_rates(const void *a, const void *b) {
 /* Sorts the runs by time, and marks those on the Pareto front. */
 static void sort_runs(trade_subject *subject) {
     double best = INFINITY;
-    qsort(subject->runs, subject->run_count, sizeof *subject->runs, compare_rates);
+    if (subject->run_count > 1) { /* the list is NULL if the budget left out all runs */
+        qsort(subject->runs, subject->run_count, sizeof *subject->runs, compare_rates);
+    }
     for (size_t i = 0; i < subject->run_count; ++i) {
         trade_run *run = &subject->runs[i];
         run->front = run->error.rmse < best;
@@ -687,8 +689,9 @@ static int trade(const trade_settings *settings, vsh_scene *scene) {
     CLI_TRY_DONE(make_truth(&work));
     work.measuring = vshi_seconds();
     CLI_TRY_DONE(measure_plans(&work));
-    sort_runs(&work.subjects[0]);
-    sort_runs(&work.subjects[1]);
+    for (size_t s = 0; s < work.subject_count; ++s) {
+        sort_runs(&work.subjects[s]);
+    }
     for (size_t i = 0; i < CLI_COUNT(outputs) && outputs[i] != NULL; ++i) {
         cli_temporary file;
         CLI_TRY_DONE(cli_temporary_begin(&file, outputs[i]));
