@@ -177,22 +177,6 @@ same_distances() {
     same_distances mask.json ring.json 0.012
 }
 
-@test "an inverted mask of another channel and a transform" {
-    # the whole picture is white in its colours: below a threshold of 2 everything
-    write_casters mask.json 0.04 '{"mask": "emblem.png", "size": [2, 1], "thickness": 0.4, "channel": "luminance", "threshold": 2,
-              "invert": true, "transform": {"rotate_deg": [0, 0, 90], "scale": 1.5, "translate": [0.2, 0, 0]}}'
-    write_casters box.json 0.04 '{"sdf": {"shape": "box", "half_size": [0.75, 1.5, 0.3], "translate": [0.2, 0, 0]}}'
-    same_distances mask.json box.json 0.001
-}
-
-@test "text is the solid of its letters" {
-    # l of DejaVu Sans is a bar from 193 to 377 of 2048 units, 1556 high
-    write_casters text.json 0.02 '{"text": "l", "font": "'$FONT'", "height": 2.048, "thickness": 0.3,
-              "transform": {"translate": [-0.285, -0.778, 0]}}'
-    write_casters bar.json 0.02 '{"sdf": {"shape": "box", "half_size": [0.092, 0.778, 0.15]}}'
-    same_distances text.json bar.json 0.001
-}
-
 @test "masks and text cast in a bake" {
     write_bake scene.json '{"text": "vdb", "font": "'$FONT'", "height": 1.5, "align": "center", "thickness": 0.3,
             "transform": {"rotate_deg": [90, 0, 0], "translate": [0, 1, 0]}},
@@ -261,12 +245,6 @@ solid() {
     {"shape": "sphere", "radius": 0.3, "translate": [0.45, 1.2, 0.3]},
     {"shape": "box", "half_size": [0.3, 0.5, 0.4], "translate": [0, -1.2, -0.5]}]}}'
     same_distances files.json shapes.json 0.02
-}
-
-@test "a grid that its file does not have" {
-    solid ball '{"shape": "sphere", "radius": 0.6}'
-    refuses_caster 2 '{"vdb": "ball.vdb"}, {"vdb": "ball.vdb", "grid": "cube"}' ball.vdb cube
-    untouched out.vdb
 }
 
 @test "Alembic and USD files are refused by name" {

@@ -269,7 +269,7 @@ refuse_each() {
     for CASE in "${cases[@]}"; do
         eval "said=(${CASE%%|*}) more=(${CASE#*|})"
         shade "$@" "${more[@]}"
-        refused "${said[@]}"
+        refused "${said[@]}" || return
     done
 }
 

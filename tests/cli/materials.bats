@@ -106,15 +106,6 @@ lit() {
     succeed compare fine.exr none.exr --max-rmse 0.004 --max-difference 0.1 --max-p99 1 --max-penumbra 9 --max-shift 9
 }
 
-@test "a texture that is not there leaves the material whole, with a warning" {
-    rm emblem.png
-    bake masked.gltf out.exr
-    says "material 'leaf' casts whole, without the holes of its texture"
-    cp "$ASSETS/emblem.png" .
-    bake whole.gltf whole.exr
-    same out.exr whole.exr
-}
-
 @test "a texture outside of the folder is not read" {
     mkdir -p in
     sed 's,"emblem.png","../emblem.png",' masked.gltf >in/masked.gltf

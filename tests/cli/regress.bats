@@ -18,13 +18,6 @@ scene() {
 JSON
 }
 
-@test "a scene that would take more than the memory limit is refused before it does" {
-    unless_sanitized "its shadow memory does not fit"
-    { printf '[{}'; yes ',{}' | head -n 1000000 | tr -d '\n'; printf ']'; } >scenes/bomb.json
-    MALLOC_ARENA_MAX=1 limited '-v 400000' regress scenes --memory-limit 100MiB
-    refused 4 'bomb.json: about ' 'MB are needed, over the memory limit of 105 MB'
-}
-
 # finds PATTERN [option …]: regress succeeds and prints what matches the pattern.
 finds() {
     succeed regress scenes "${@:2}"

@@ -24,19 +24,12 @@ fits() {
     done
 }
 
-@test "every command has its own help, which fits 100 columns" {
-    for command in $(commands); do
-        succeed "$command" --help
-        [[ $output == "Usage: vdbshade $command "* ]] || fail "no usage line"
-        [ -z "$stderr" ] || fail "something on standard error"
-        fits
-    done
-}
-
-@test "the help of options fills its column, counted in characters" {
+@test "every command has its own help within 100 columns, whose options fill their column, counted in characters" {
     local LC_ALL=C.UTF-8 line text before
     for command in $(commands); do
-        succeed "$command" --help
+        succeed_printing "Usage: vdbshade $command " -- "$command" --help
+        [ -z "$stderr" ] || fail "something on standard error"
+        fits
         before=
         for line in "${lines[@]}"; do
             text=${line:30}
@@ -243,15 +236,6 @@ LIST
     MANWIDTH=1000 man -l pages/share/man/man1/vdbshade-bake.1 | col -b >plain.txt
     grep -qF -- "radius of points and spots of --lights, scene units (0: hard)" plain.txt
     grep -qF -- "R=NAME,…" plain.txt
-}
-
-@test "mandoc finds nothing wrong with a man page, but that it has no date" {
-    command -v mandoc >/dev/null || skip "no mandoc"
-    "$VDBSHADE" help --write pages
-    for page in pages/share/man/man1/*; do
-        mandoc -Tlint "$page" | grep -v 'missing date, using ""' >lint.txt || true
-        [ ! -s lint.txt ] || fail "$(cat lint.txt)"
-    done
 }
 
 # endings_after TEXT: the endings in the first column of the table whose head holds the text.

@@ -16,15 +16,6 @@ prepare() {
     info_tells seeds.vdb "class: level set"
 }
 
-@test "the same values for any number of threads" {
-    for threads in 1 5; do
-        succeed voxelize box.obj -o "$threads.vdb" --resolution 64 --threads "$threads" --quiet
-    done
-    same_values 1.vdb 5.vdb || fail "they differ"
-    shade voxelize box.obj -o other.vdb --resolution 65 --quiet
-    if same_values 1.vdb other.vdb; then fail "any two are the same"; fi
-}
-
 @test "bad options and places are refused" {
     old_output out.vdb
     refuse_each voxelize <<'LIST'
