@@ -19,11 +19,6 @@ load helper
     info_tells out.exr "2 channels"
 }
 
-@test "a lone convex body: lit where it faces the sun, dark where it does not, open all over" {
-    succeed bake box.obj --sun 0,1,0 --sun-angle 5 --ao 0.5 --size 64 --resolution 48 --quiet -o out.exr
-    info_tells out.exr "channel 'A': min 0, mean " ", max 1" "channel 'ao': min 1, mean 1, max 1" "channel 'shadow.sun': min 0, mean " ", max 1"
-}
-
 # of_preview CHANNEL OPTION METHOD: a bake of the floor under the seeds, for its penumbrae; its mean is new to $means.
 of_preview() {
     succeed bake "$ASSETS/seeds.json" --size 64 --voxel-size 0.1 --method hard --ao-method cones "$2" "$3" --quiet \

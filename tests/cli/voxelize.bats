@@ -63,27 +63,6 @@ LIST
     info_tells crate.obj "taken for: 1 open solid," "problem: 4 open edges"
 }
 
-# A floor of 6 × 6, and a box without its bottom in it: 4 of 36 of the floor are within.
-write_standing() {
-    {
-        printf 'o floor\n'
-        printf 'v %s %s %s\n' -3 0 -3 3 0 -3 3 0 3 -3 0 3
-        printf 'vt %s %s\n' 0 0 1 0 1 1 0 1
-        printf 'f 1/1 4/4 3/3 2/2\no hut\n'
-        printf 'v %s %s %s\n' -1 -0.1 -1 1 -0.1 -1 1 -0.1 1 -1 -0.1 1 -1 2 -1 1 2 -1 1 2 1 -1 2 1
-        printf 'f %s %s %s %s\n' 12 11 10 9 5 9 10 6 6 10 11 7 7 11 12 8 8 12 9 5
-    } >"$1"
-}
-
-@test "texels of a floor below a hut without a floor are hidden" {
-    write_standing stands.obj
-    info_tells stands.obj "taken for: 1 open solid, hidden"
-    succeed bake stands.obj --receive floor -o floor.exr --ao 1 --size 60 --stats stats.json --verbose
-    [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 400' ] || fail "$(cat stats.json)"
-    succeed bake stands.obj --receive floor --treat hut=sheet -o floor.exr --ao 1 --size 60 --stats stats.json
-    [ "$(grep -oE '"invalid_texels": [0-9]+' stats.json)" = '"invalid_texels": 0' ] || fail "$(cat stats.json)"
-}
-
 # A slab of 6 × 6, and 25 studs without bottoms on it, 6 cm wide and 9 cm high.
 write_studs() {
     {
@@ -114,11 +93,6 @@ write_studs() {
     local largest
     largest=$(sed -nE 's/^ao:.* max ([0-9.]+) at.*/\1/p' <<<"$output")
     awk -v largest="$largest" 'BEGIN { exit !(largest > 0 && largest < 0.175) }' || fail "off by $largest"
-}
-
-@test "a room whose faces look inwards is baked" {
-    succeed bake room.obj -o room.exr --verbose --ao 0.5 --size 64 --resolution 64 --ao-method exact
-    [[ $stderr != *"are invalid"* ]] || fail "$stderr"
 }
 
 @test "solid, shell and inward overrule what is found, and a pattern that matches nothing is refused with names" {
