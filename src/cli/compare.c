@@ -420,17 +420,17 @@ static size_t count_tests(const cli_comparison *c, size_t *failures) {
 }
 
 /* Writes text with its special characters escaped, between markup. */
-static void put(FILE *out, const char *before, const char *text, const char *after) {
+static void write_escaped(FILE *out, const char *before, const char *text, const char *after) {
     fputs(before, out);
     cli_escape(out, text);
     fputs(after, out);
 }
 
 static void write_case(FILE *out, const cli_comparison *c, const char *name, const char *failure) {
-    put(out, "    <testcase classname=\"", name_of(c), "\"");
-    put(out, " name=\"", name, failure[0] == '\0' ? "\"/>\n" : "\">\n");
+    write_escaped(out, "    <testcase classname=\"", name_of(c), "\"");
+    write_escaped(out, " name=\"", name, failure[0] == '\0' ? "\"/>\n" : "\">\n");
     if (failure[0] != '\0') {
-        put(out, "      <failure message=\"", failure, "\"/>\n    </testcase>\n");
+        write_escaped(out, "      <failure message=\"", failure, "\"/>\n    </testcase>\n");
     }
 }
 
@@ -445,7 +445,7 @@ static void write_junit(FILE *out, const cli_comparison *comparisons, size_t cou
         const cli_comparison *c = &comparisons[i];
         failures = 0;
         tests = count_tests(c, &failures);
-        put(out, "  <testsuite name=\"", name_of(c), "\"");
+        write_escaped(out, "  <testsuite name=\"", name_of(c), "\"");
         fprintf(out, " tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", tests, failures);
         const char *problem;
         const vsh_channel_comparison *channel;
@@ -499,9 +499,9 @@ static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
 }
 
 static void write_channel(FILE *out, const vsh_channel_comparison *channel, const char *pictures) {
-    put(out, "<h3>", channel->name, ": ");
+    write_escaped(out, "<h3>", channel->name, ": ");
     fprintf(out, "%s</h3>\n", verdict(channel->alike));
-    put(out, "<p>", explain(channel), "</p>\n");
+    write_escaped(out, "<p>", explain(channel), "</p>\n");
     if (channel->is_coverage) {
         fprintf(out,
                 "<p>%" PRIu64 " texels covered in golden, %" PRIu64 " in new, %" PRIu64
@@ -520,15 +520,15 @@ static void write_page(FILE *out, const cli_comparison *comparisons, size_t coun
     fputs("<title>vdbshade: golden and new</title>\n<h1>Golden and new</h1>\n", out);
     for (size_t i = 0; i < count; ++i) {
         const cli_comparison *c = &comparisons[i];
-        put(out, "<h2>", name_of(c), ": ");
+        write_escaped(out, "<h2>", name_of(c), ": ");
         fprintf(out, "%s</h2>\n", verdict(c->alike));
         if (c->golden != NULL && c->fresh != NULL) {
-            put(out, "<p>Golden: <code>", c->golden, "</code>");
-            put(out, ", new: <code>", c->fresh, "</code></p>\n");
+            write_escaped(out, "<p>Golden: <code>", c->golden, "</code>");
+            write_escaped(out, ", new: <code>", c->fresh, "</code></p>\n");
         }
         const char *problem;
         for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL; ++k) {
-            put(out, "<p class=\"bad\">", problem, "</p>\n");
+            write_escaped(out, "<p class=\"bad\">", problem, "</p>\n");
         }
         const vsh_channel_comparison *channel;
         for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {

@@ -28,7 +28,7 @@ static const cli_option options[] = {
  * that it names are not written. */
 static int merge(const merge_settings *s, int argc, char **argv) {
     CLI_REFUSE_IF(argc < 2 || argc >= MOST_WORDS || strcmp(argv[0], cli_bake.name) != 0,
-                  "%s: its parts are of no bake", s->output);
+                  "%s: its parts hold no command of bake; bake them again", s->output);
     cli_bake_settings bake;
     const cli_common given = cli_given;
     const vsh_run run = cli_run;
@@ -36,7 +36,7 @@ static int merge(const merge_settings *s, int argc, char **argv) {
     cli_given = given;
     cli_run = run;
     cli_begin_progress(!given.quiet);
-    CLI_REFUSE_IF(code == CLI_HELP, "%s: its parts are of no bake", s->output);
+    CLI_REFUSE_IF(code == CLI_HELP, "%s: its parts hold no command of bake; bake them again", s->output);
     CLI_TRY(code);
     if (bake.output != NULL) { /* a folder of objects stays one */
         bake.output = *cli_file_name(bake.output) == '\0' ? cli_end_path(s->output, "/") : s->output;

@@ -45,7 +45,7 @@ static int set(const vsh_setting *setting, const char *text, void *owner) {
 }
 
 /* Stores the value of a setting, and checks it at once, before any file is read. */
-static int give_setting(size_t index, const char *value) {
+static int store_setting(size_t index, const char *value) {
     vsh_scene scene = vsh_scene_default();
     vsh_receiver receiver = vsh_receiver_default();
     vsh_flat_scene flat = vsh_flat_scene_default();
@@ -60,7 +60,7 @@ static int give_setting(size_t index, const char *value) {
 int cli_set_default(const char *option, const char *value) {
     for (size_t i = 0; cli_setting(i) != NULL; ++i) {
         if (strcmp(cli_setting(i)->option, option) == 0) {
-            return cli_was_given(option) ? CLI_OK : give_setting(i, value);
+            return cli_was_given(option) ? CLI_OK : store_setting(i, value);
         }
     }
     return CLI_OK;
@@ -286,8 +286,8 @@ int cli_parse_density(void *at, const char *name, const char *value) {
 
 enum { MOST_OPERANDS = 2 };
 
-/* A command line that is being parsed. */
-typedef struct parsing {
+/* A command line, while it is parsed. */
+typedef struct command_line {
     const cli_command *command;
     int argc;
     char **argv;
@@ -295,9 +295,9 @@ typedef struct parsing {
     const char *operands[MOST_OPERANDS + 1]; /* the first ones */
     int operand_count;
     FILE *record; /* the line for provenance */
-} parsing;
+} command_line;
 
-static int unknown_option(const parsing *p, const char *text) {
+static int unknown_option(const command_line *p, const char *text) {
     cli_option list[CLI_MOST_OPTIONS];
     const size_t rows = cli_list_options(p->command, list);
     const char *names[CLI_MOST_OPTIONS], *word = text + strspn(text, "-");
@@ -348,7 +348,7 @@ static int store(const cli_option *o, void *settings, const char *name, const ch
     bool good = true;
     switch (o->kind) {
     case CLI_KIND_SETTING:
-        return give_setting(o->place, value);
+        return store_setting(o->place, value);
     case CLI_KIND_TEXT:
         *(const char **)at = value;
         break;
@@ -407,7 +407,7 @@ static int store(const cli_option *o, void *settings, const char *name, const ch
 }
 
 /* Parses an option. If `value` is NULL, the next word is its value, and *at moves to it. */
-static int parse_option(parsing *p, const cli_option *option, const char *value, int *at) {
+static int parse_option(command_line *p, const cli_option *option, const char *value, int *at) {
     const char *name = cli_keep_text("--%s", option->name);
     CLI_REFUSE_IF(value != NULL && option->value == NULL, "%s: takes no value", name);
     if (value == NULL && option->value != NULL) {
@@ -426,7 +426,7 @@ static int parse_option(parsing *p, const cli_option *option, const char *value,
 }
 
 /* Parses "-q", "-o", "-oVALUE" or "-qo". */
-static int parse_letters(parsing *p, int *at) {
+static int parse_letters(command_line *p, int *at) {
     cli_option option = {.value = NULL};
     for (const char *c = p->argv[*at] + 1; *c != '\0' && option.value == NULL; ++c) {
         const char letter[] = {'-', *c, '\0'};
@@ -439,7 +439,7 @@ static int parse_letters(parsing *p, int *at) {
 }
 
 /* Parses all options, and lists the operands between them and after "--". */
-static int parse_words(parsing *p) {
+static int parse_words(command_line *p) {
     bool ended = false;
     for (int at = 1; at < p->argc; ++at) {
         const char *word = p->argv[at], *sign = strchr(word, '=');
@@ -461,7 +461,7 @@ static int parse_words(parsing *p) {
 }
 
 /* Assigns the operands that the usage begins with: "INPUT [OTHER] -o OUT [options]". */
-static int assign_operands(const parsing *p, const char **operands) {
+static int assign_operands(const command_line *p, const char **operands) {
     const char *command = p->command->name, *at = p->command->usage, *name = "";
     bool optional = false;
     int count = 0;
@@ -477,7 +477,7 @@ static int assign_operands(const parsing *p, const char **operands) {
         }
         at += length + (int)strspn(at + length, " ");
     }
-    CLI_REFUSE_IF(count < p->operand_count, "%s: expected one %s, not also '%s'", command, name,
+    CLI_REFUSE_IF(count < p->operand_count, "%s: expected one %s, but '%s' is one more", command, name,
                   p->operands[count]);
     cli_parsed.grid = count == 1 && !optional ? cli_split_grid(&operands[0]) : NULL;
     cli_parsed.input = operands[0];
@@ -505,7 +505,7 @@ static uint64_t find_memory(void) {
 }
 
 int cli_parse(const cli_command *command, int argc, char **argv, void *settings, const char **operands) {
-    parsing p = {.command = command, .argc = argc, .argv = argv, .settings = settings};
+    command_line p = {.command = command, .argc = argc, .argv = argv, .settings = settings};
     free(cli_parsed.command);
     cli_given = (cli_common){.quiet = false};
     cli_run = vsh_run_default();

@@ -421,7 +421,7 @@ static int find_cases(void) {
     }
     work.case_count = kept;
     if (kept == 0) {
-        return only != NULL ? cli_usage("%s: no case's name holds '%s'", work.settings.folder, only)
+        return only != NULL ? cli_usage("%s: no case has '%s' in its name", work.settings.folder, only)
                             : cli_usage("%s: no scenes (.json) in it", work.settings.folder);
     }
     for (size_t i = 0; i < kept; ++i) {

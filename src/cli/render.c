@@ -111,10 +111,10 @@ static int set_options(render_settings *s) {
         o->camera.fov = s->fov_deg * CLI_DEGREE;
     }
     CLI_REFUSE_IF(s->bake.output == NULL, "render: no output; give -o OUT");
-    CLI_REFUSE_IF(cli_was_given("look-at") && !cli_was_given("camera"), "--look-at: there is no --camera");
+    CLI_REFUSE_IF(cli_was_given("look-at") && !cli_was_given("camera"), "--look-at: needs --camera X,Y,Z");
     CLI_REFUSE_IF(s->transparent && o->shafts > 0.0,
                   "--background none: not with --shafts, which would cover it");
-    CLI_REFUSE_IF(s->pack != NULL && s->lightmaps.count == 0, "--lightmap-pack: there is no --lightmap");
+    CLI_REFUSE_IF(s->pack != NULL && s->lightmaps.count == 0, "--lightmap-pack: needs --lightmap FILE");
     CLI_REFUSE_IF(o->width > VSH_MAX_PICTURE_SIZE || o->height > VSH_MAX_PICTURE_SIZE,
                   "--size %dx%d: expected at most %d pixels a side", o->width, o->height,
                   VSH_MAX_PICTURE_SIZE);

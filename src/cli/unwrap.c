@@ -50,9 +50,9 @@ static int set_options(unwrap_settings *s) {
     vsh_unwrap_options *o = &s->options;
     CLI_REFUSE_IF(s->max_size > 0 && cli_was_given("size"), "--max-size and --size: give one of the two");
     CLI_REFUSE_IF(s->max_size > 0 && o->texels_per_unit == 0.0,
-                  "--max-size: there is no --texels-per-unit, and any size is filled");
+                  "--max-size: needs --texels-per-unit; without it charts fill pages of any size");
     CLI_REFUSE_IF(o->atlas == VSH_ATLAS_OBJECTS && o->max_pages > 1,
-                  "--pages: with --atlas objects each object has one");
+                  "--pages: not with --atlas objects, which gives each object one page");
     o->fit_pages = s->max_size > 0;
     o->width = s->max_size > 0 ? s->max_size : s->size[0];
     o->height = s->max_size > 0 ? s->max_size : s->size[1];

@@ -63,7 +63,7 @@ static int set_options(volume_settings *s) {
     const char *where = s->band > 0.0 ? "--band" : has_box(s) ? "--box" : "--like";
     CLI_REFUSE_IF((s->band > 0.0) + has_box(s) + (s->like != NULL) > 1,
                   "%s: give one of --band, --box and --like", where);
-    CLI_REFUSE_IF(s->box_voxel_size > 0.0 && !has_box(s), "--box-voxel-size: there is no --box");
+    CLI_REFUSE_IF(s->box_voxel_size > 0.0 && !has_box(s), "--box-voxel-size: needs --box");
     const char *like = s->like;
     s->like_grid = like != NULL ? cli_split_grid(&s->like) : NULL;
     CLI_REFUSE_IF(like != NULL && (*like == '\0' || (s->like_grid != NULL && *s->like_grid == '\0')),

@@ -21,10 +21,6 @@ static vsh_result fail_damaged(const char *path, const char *what, vsh_error *er
     return vshi_fail(error, VSH_ERROR_INPUT, "%s: damaged: %s; bake this part again", path, what);
 }
 
-static vsh_result refuse_memory(const char *what, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-}
-
 /* --- names of parts */
 
 /* The name of the parts' files: the options' name, or the first lightmap's output. */
@@ -40,7 +36,7 @@ static vsh_result name_part(const char *name, int32_t shard, int32_t count, char
         return VSH_OK;
     }
     *path = NULL;
-    return refuse_memory(name, error);
+    return vshi_fail_memory(error, name);
 }
 
 /* N of "NAME.I-of-N.part"; 0: another name. */
@@ -60,7 +56,7 @@ static vsh_result count_shards(const char *parts, int32_t *count, vsh_error *err
     const char *slash = strrchr(parts, '/');
     char *folder = vshi_copy_folder(parts);
     if (folder == NULL) {
-        return refuse_memory(parts, error);
+        return vshi_fail_memory(error, parts);
     }
     DIR *open = opendir(folder);
     free(folder);
@@ -176,7 +172,7 @@ static vsh_result move_array(part_file *f, const vshi_scene_page *page, const pl
     return VSH_OK;
 }
 
-/* Moves a tile's texels to compare with the casters. What is read must lie in the tile. */
+/* Moves a tile's texels to compare with the casters. The texels that it reads must lie in the tile. */
 static vsh_result move_held(part_file *f, const place *at, vshi_held_texels *held, vsh_error *error) {
     uint64_t count = held->count;
     VSHI_TRY(move_bytes(f, &count, sizeof count, error));
@@ -283,7 +279,7 @@ static vsh_result hash_layout(const vshi_scene_bake *bake, uint64_t *layout, vsh
 
 /* --- writing */
 
-static void put_text(FILE *out, const char *text) {
+static void write_text(FILE *out, const char *text) {
     fwrite(text, strlen(text) + 1, 1, out);
 }
 
@@ -293,16 +289,16 @@ static vsh_result join_texts(const vshi_scene_bake *bake, char **texts, size_t *
     const vsh_attribute *attributes = vsh_provenance_attributes(bake->provenance, &count);
     FILE *out = open_memstream(texts, size);
     if (out == NULL) {
-        return refuse_memory("part", error);
+        return vshi_fail_memory(error, "part");
     }
     for (size_t i = 0; i < bake->options.word_count; ++i) {
-        put_text(out, bake->options.words[i]);
+        write_text(out, bake->options.words[i]);
     }
     for (size_t i = 0; i < count; ++i) {
-        put_text(out, attributes[i].name);
-        put_text(out, attributes[i].value);
+        write_text(out, attributes[i].name);
+        write_text(out, attributes[i].value);
     }
-    return fclose(out) == 0 ? VSH_OK : refuse_memory("part", error);
+    return fclose(out) == 0 ? VSH_OK : vshi_fail_memory(error, "part");
 }
 
 /* Writes what is before the tiles. */
@@ -403,8 +399,9 @@ vsh_result vshi_bake_part(vshi_scene_bake *bake, vsh_error *error) {
     part_file f = {.sum = VSHI_PART_SUM};
     char *path = NULL;
     vsh_result result;
-    vshi_job *tiles = vshi_job_begin(&bake->run, "bake", (count_tiles(bake) + shards - 1) / shards);
-    VSHI_TRY_DONE(tiles != NULL ? VSH_OK : refuse_memory("part", error));
+    vshi_job *tiles;
+    VSHI_TRY(
+        vshi_job_open(&tiles, &bake->run, "bake", (count_tiles(bake) + shards - 1) / shards, "part", error));
     VSHI_TRY_DONE(
         name_part(find_parts_name(bake), bake->options.shard, bake->options.shard_count, &path, error));
     VSHI_TRY_DONE(vshi_output_begin(&output, path, error));
@@ -441,10 +438,11 @@ static vsh_result open_part(const char *path, part_file *f, vshi_part_front *fro
     }
     if (*size >= least && (memcmp(front->magic, VSHI_PART_MAGIC, sizeof front->magic) != 0 ||
                            front->order != VSHI_PART_ORDER)) {
-        return vshi_fail(error, VSH_ERROR_INPUT,
-                         "%s: is of another version of vdbshade, or of another kind of machine; bake this "
-                         "part again",
-                         path);
+        return vshi_fail(
+            error, VSH_ERROR_INPUT,
+            "%s: was written by another version of vdbshade, or on another kind of machine; bake "
+            "this part again",
+            path);
     }
     if (*size < least || front->head_bytes > *size - least) {
         return fail_damaged(path, "it ends early", error);
@@ -462,8 +460,8 @@ static vsh_result check_sum(part_file *f, const vshi_part_front *front, const ch
     uint64_t sum = vshi_part_sum(VSHI_PART_SUM, front, sizeof *front);
     unsigned char *chunk = NULL;
     vsh_result result;
-    vshi_job *job = vshi_job_begin(run, "parts", (size_t)(left / CHUNK) + 1);
-    VSHI_TRY_DONE(job != NULL ? VSH_OK : refuse_memory(f->path, error));
+    vshi_job *job;
+    VSHI_TRY(vshi_job_open(&job, run, "parts", (size_t)(left / CHUNK) + 1, f->path, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&chunk, CHUNK, 1, f->path, error));
     sum = vshi_part_sum(sum, texts, (size_t)front->head_bytes);
     while (left > 0) {
@@ -500,11 +498,12 @@ static vsh_result check_attributes(const char *path, const char *at, const char 
         if (i < count ? name == NULL || value == NULL || strcmp(name, own[i].name) != 0 ||
                             strcmp(value, own[i].value) != 0
                       : name != NULL) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "%s: is of other inputs or options: its %s is '%.160s', of the others or here "
-                             "'%.160s'; bake this part again",
-                             path, i < count ? own[i].name : name, value != NULL ? value : "",
-                             i < count ? own[i].value : "");
+            return vshi_fail(
+                error, VSH_ERROR_INPUT,
+                "%s: was baked from other inputs or options: its %s is '%.160s', expected '%.160s'; "
+                "bake this part again",
+                path, i < count ? own[i].name : name, value != NULL ? value : "",
+                i < count ? own[i].value : "");
         }
     }
     return VSH_OK;

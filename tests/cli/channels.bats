@@ -42,8 +42,8 @@ load helper
 @test "what does not go together is told" {
     write_scene box.json box.obj '"tint": [0, 1, 1]'
     refuse_each bake -o box.exr <<'LIST'
-2 "vdbshade: --bent-normals: there is no --ao" | box.obj --sun 1,1,1 --bent-normals world
-2 "AO by taps knows no directions" | box.obj --ao 1 --ao-method taps --bent-normals world
+2 "vdbshade: --bent-normals: needs --ao DISTANCE" | box.obj --sun 1,1,1 --bent-normals world
+2 "AO by taps has no directions" | box.obj --ao 1 --ao-method taps --bent-normals world
 2 "'up'" "world, tangent" | box.obj --ao 1 --bent-normals up
 2 box.json tint | box.json
 2 "expected three numbers of at least 0" | box.obj --sun 1,1,1 --ambient -1,1,1

@@ -61,7 +61,7 @@ JSON
     refuse_each bake box.obj <<'LIST'
 2 "--lights 'box.obj': has no lights" | --lights box.obj -o out.exr
 3 none.glb 'No such file' | --lights none.glb -o out.exr
-2 '--light-radius: there is no --lights' | --sun 0,1,0 --light-radius 1 -o out.exr
+2 '--light-radius: needs --lights FILE' | --sun 0,1,0 --light-radius 1 -o out.exr
 LIST
     write_lit lit.gltf "$(down 0 lamp 0,3,0)" '{"type": "point", "intensity": -1}'
     refuses 2 lit.gltf 'lights[0]' 'intensity' '-1' -- bake box.obj --lights lit.gltf -o out.exr

@@ -238,7 +238,7 @@ inputs_are() {
     bake masked.gltf part.exr --shard 1/2
     "$VDBSHADE" bake "$ASSETS/seeds_floor.obj" --sun 0,1,0 --size 8 -o emblem.png --quiet # which is opaque
     bake masked.gltf part.exr --shard 2/2
-    refuses 2 part.exr.1-of-2.part 'is of other inputs or options' emblem.png -- merge part.exr
+    refuses 2 part.exr.1-of-2.part 'was baked from other inputs or options' emblem.png -- merge part.exr
     differ_printing "leaf: not alike" -- regress scenes
 }
 

@@ -146,18 +146,18 @@ one_is() {
     old_output out.exr
     parts out.exr 2 1 box.obj "${SMALL[@]}"
     parts out.exr 2 2 box.obj "${SMALL[@]}" --max-error 0.1
-    refuses 2 "out.exr.2-of-2.part: is of other inputs or options: its vdbshade_command is" "max-error" -- merge out.exr
+    refuses 2 "out.exr.2-of-2.part: was baked from other inputs or options: its vdbshade_command is" "max-error" -- merge out.exr
     parts out.exr 2 2 box.obj "${SMALL[@]}"
     cp out.exr.2-of-2.part good
     cp out.exr.1-of-2.part out.exr.2-of-2.part
     refuses 2 "out.exr.2-of-2.part: holds part 1 of 2; was it renamed?" -- merge out.exr
     sed "s/^vdbshade part ./vdbshade part 8/" good >out.exr.2-of-2.part
-    refuses 2 "out.exr.2-of-2.part: is of another version of vdbshade" -- merge out.exr
+    refuses 2 "out.exr.2-of-2.part: was written by another version of vdbshade" -- merge out.exr
     # the input changed behind the parts
     cp good out.exr.2-of-2.part
     parts box.exr 2 "" box.obj "${SMALL[@]}"
     echo "# again" >>box.obj
-    refuses 2 "box.exr.1-of-2.part: is of other inputs or options: its vdbshade_input_0 is" -- merge box.exr
+    refuses 2 "box.exr.1-of-2.part: was baked from other inputs or options: its vdbshade_input_0 is" -- merge box.exr
     untouched out.exr
 }
 

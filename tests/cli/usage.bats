@@ -110,9 +110,9 @@ LIST
     refuse_each bake box.obj <<'LIST'
 2 magic 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact, auto' | -o out.exr "${SMALL[@]}" --method magic
 2 ray 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact, auto' | -o out.exr "${SMALL[@]}" --method ray
-2 --rays cone 'rays, adaptive and exact' | -o out.exr "${SMALL[@]}" --rays 8 --method cone
+2 --rays cone 'rays, adaptive or exact' | -o out.exr "${SMALL[@]}" --rays 8 --method cone
 2 --error smooth | -o out.exr "${SMALL[@]}" --error --method smooth
-2 --max-error rays 'adaptive and exact' | -o out.exr "${SMALL[@]}" --max-error 0.1 --method rays
+2 --max-error rays 'adaptive or exact' | -o out.exr "${SMALL[@]}" --max-error 0.1 --method rays
 2 --sun --ao | -o out.exr
 2 --sun-angle | -o out.exr --ao 1 --sun-angle 5
 2 --ao-method | -o out.exr --sun 0,1,0 --ao-method cones

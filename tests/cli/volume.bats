@@ -82,7 +82,7 @@ LIST
         refuses 2 --box-voxel-size -- volume scene.json -o out.vdb --box 0,0,0,1,1,1 --box-voxel-size "$size"
     done
     refuse_each volume scene.json -o <<'LIST'
-2 'no --box' | out.vdb --box-voxel-size 1
+2 'needs --box' | out.vdb --box-voxel-size 1
 2 'one of' | out.vdb --box 0,0,0,1,1,1 --band 2
 2 'one of' | out.vdb --box 0,0,0,1,1,1 --like a.vdb
 2 --band | out.vdb --band 0

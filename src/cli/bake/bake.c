@@ -130,6 +130,13 @@ const cli_command cli_bake = {
 
 /* --- checks before anything is read */
 
+/* Refuses a path that ends otherwise. NULL is none. */
+static int check_ending(const char *option, const char *path, const char *ending) {
+    return path == NULL || cli_has_ending(path, ending)
+               ? CLI_OK
+               : cli_usage("--%s '%s': expected a name that ends in .%s", option, path, ending);
+}
+
 /* Refuses options that are for other kinds of outputs. */
 static int check_kinds(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *for_assets = s->preview ? "preview" : s->exr != NULL ? "exr" : NULL;
@@ -141,18 +148,18 @@ static int check_kinds(const cli_bake_settings *s, const vsh_scene *scene) {
                   "--%s: not together with --shard; give it to 'vdbshade merge'", for_whole);
     CLI_REFUSE_IF(s->merged != NULL && s->output == NULL &&
                       strcmp(s->merged, scene->receivers[0].output) != 0,
-                  "%s: these are parts of %s, whose first output is %s", s->merged, s->input,
+                  "%s: these are parts of %s; run 'vdbshade merge %s'", s->merged, s->input,
                   scene->receivers[0].output);
-    CLI_REFUSE_IF(s->invalid_picture != NULL && !cli_has_ending(s->invalid_picture, "png"),
-                  "--invalid '%s': expected a name that ends in .png", s->invalid_picture);
+    CLI_TRY(check_ending("invalid", s->invalid_picture, "png"));
+    CLI_TRY(check_ending("exr", s->exr, "exr"));
+    CLI_TRY(check_ending("view", s->view, "html"));
     size_t assets = 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
     }
     CLI_REFUSE_IF(for_assets != NULL && assets == 0, "--%s: is for outputs that end in .glb, .gltf or .obj",
                   for_assets);
-    CLI_REFUSE_IF(s->exr != NULL && (!cli_has_ending(s->exr, "exr") || scene->receiver_count != 1),
-                  "--exr '%s': expected a name that ends in .exr, and one output", s->exr);
+    CLI_REFUSE_IF(s->exr != NULL && scene->receiver_count != 1, "--exr '%s': is for one output", s->exr);
     return CLI_OK;
 }
 
@@ -163,8 +170,6 @@ static int check_view(const cli_bake_settings *s, const vsh_scene *scene) {
     if (s->view == NULL) {
         return CLI_OK;
     }
-    CLI_REFUSE_IF(!cli_has_ending(s->view, "html"), "--view '%s': expected a name that ends in .html",
-                  s->view);
     CLI_REFUSE_IF((s->per_object && !asset) || scene->receiver_count != 1 ||
                       receiver->type != VSH_RECEIVER_MESH,
                   "--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", s->view);
@@ -199,17 +204,17 @@ static int check_files(const cli_bake_settings *s, const vsh_scene *scene) {
 
 enum { MOST_LINES = 8 }; /* lightmaps that get a line each */
 
-typedef struct baking {
+typedef struct bake_run {
     const cli_bake_settings *settings;
     const vsh_scene *scene;
     const char *parts; /* the name before ".I-of-N.part" */
     size_t count;      /* lightmaps */
     int code;          /* exit code of check_loaded() */
     bool files_known;  /* their warnings are not printed yet */
-} baking;
+} bake_run;
 
 /* Checks the outputs again: objects' outputs have their names now, and models their textures. */
-static int check_lightmaps(const baking *b, const vsh_scene_lightmap *lightmaps, size_t count) {
+static int check_lightmaps(const bake_run *b, const vsh_scene_lightmap *lightmaps, size_t count) {
     const cli_bake_settings *s = b->settings;
     const char *const others[] = {s->stats, s->exr, s->view, s->invalid_picture};
     const char **outputs = calloc(count + CLI_COUNT(others), sizeof *outputs);
@@ -231,7 +236,7 @@ done:
 
 static vsh_result check_loaded(void *user, const vsh_scene_lightmap *lightmaps, size_t count,
                                vsh_error *error) {
-    baking *b = user;
+    bake_run *b = user;
     (void)error; /* check_lightmaps() has printed it */
     b->count = count;
     b->files_known = true;
@@ -241,7 +246,7 @@ static vsh_result check_loaded(void *user, const vsh_scene_lightmap *lightmaps, 
 
 /* Prints the warnings about files before the long work. */
 static int32_t report_progress(void *user, const char *stage, double fraction) {
-    baking *b = user;
+    bake_run *b = user;
     if (b->files_known && strcmp(stage, "bake") == 0) {
         b->files_known = false;
         cli_print_warnings();
@@ -249,12 +254,12 @@ static int32_t report_progress(void *user, const char *stage, double fraction) {
     return cli_report_progress(NULL, stage, fraction);
 }
 
-static bool has_lines(const baking *b) {
+static bool has_lines(const bake_run *b) {
     return b->settings->shard[0] == 0 && (b->count <= MOST_LINES || cli_given.verbose);
 }
 
 static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
-    const baking *b = user;
+    const bake_run *b = user;
     if (has_lines(b)) {
         cli_inform("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output,
                    lightmap->width, lightmap->height, lightmap->covered, lightmap->invalid_texels);
@@ -280,7 +285,7 @@ static int write_view(const cli_bake_settings *s, const vsh_receiver *receiver) 
     return cli_check_input(vsh_view_write(s->view, &bake, NULL, &cli_run, &cli_error));
 }
 
-static int report_bake(const baking *b, const vsh_bake_report *report) {
+static int report_bake(const bake_run *b, const vsh_bake_report *report) {
     const cli_bake_settings *s = b->settings;
     const vsh_scene *scene = b->scene;
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS);
@@ -316,7 +321,7 @@ static int report_bake(const baking *b, const vsh_bake_report *report) {
     return CLI_OK;
 }
 
-static int print_forecast(const baking *b, const vsh_bake_options *how, const vsh_run *run) {
+static int print_forecast(const bake_run *b, const vsh_bake_options *how, const vsh_run *run) {
     vsh_bake_forecast f;
     const vsh_result result = vsh_forecast_scene(b->scene, how, run, &f, &cli_error);
     CLI_TRY(b->code != CLI_OK ? b->code : cli_check_input(result));
@@ -339,7 +344,7 @@ static int print_forecast(const baking *b, const vsh_bake_options *how, const vs
 /* Bakes a checked scene, merges its parts, or forecasts the bake. */
 static int bake_scene(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
-    baking b = {.settings = s, .scene = scene};
+    bake_run b = {.settings = s, .scene = scene};
     b.parts = s->merged != NULL ? s->merged : cli_end_path(output, ""); /* a folder of objects may be one */
     vsh_run run = cli_run;
     run.progress = report_progress;

@@ -155,7 +155,7 @@ static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made,
                   "\"objects\" and \"except\"",
                   s->receive.count > 0 ? "receive" : "no-receive", s->input);
     CLI_REFUSE_IF(s->no_cast.count > 0 && made->read != NULL,
-                  "--no-cast: the casters of a scene are in its file, %s; see \"except\"", s->input);
+                  "--no-cast: not for a scene; use \"except\" of the casters in %s", s->input);
     return CLI_OK;
 }
 
@@ -165,7 +165,8 @@ static int check_receivers(const cli_bake_settings *s, const cli_bake_scene *mad
                   "--output-folder '%s': %s", s->output_folder,
                   s->output != NULL ? "there is also -o" : "for the outputs that a scene names");
     CLI_REFUSE_IF(receivers > 1 && s->output != NULL && !(s->per_object && is_of_objects(s->output)),
-                  "-o '%s': %s has %zu receivers, each with its own output", s->output, s->input, receivers);
+                  "-o '%s': %s has %zu receivers with outputs of their own; use --output-folder FOLDER",
+                  s->output, s->input, receivers);
     CLI_REFUSE_IF(made->read == NULL && cli_has_ending(s->input, "vdb") && s->floor[0] == 0.0,
                   "%s: a level set has no UVs to bake a lightmap by; give --floor W,D,X,Y,Z for a floor "
                   "that receives, or bake voxels with 'vdbshade volume'",
@@ -218,7 +219,8 @@ static int move_lights(const cli_bake_settings *s, cli_bake_scene *made) {
             memcpy(made->lights[file->first + k].position, lights[k].position, sizeof lights[k].position);
         }
         vsh_lights_free(lights);
-        CLI_REFUSE_IF(!same, "%s: its lights changed since %s was read", file->path, s->input);
+        CLI_REFUSE_IF(!same, "%s: its lights changed since %s was read; run this again", file->path,
+                      s->input);
     }
     return CLI_OK;
 }
@@ -242,8 +244,8 @@ static int join_lights(const cli_bake_settings *s, const vsh_light *others, size
     for (size_t i = 0; i < count; ++i) {
         for (size_t k = 0; k < made->scene.light_count; ++k) {
             CLI_REFUSE_IF(strcmp(made->lights[k].name, others[i].name) == 0,
-                          "--lights '%s': its light '%s' has the name of %s", s->lights, others[i].name,
-                          cli_was_given("sun") ? "--sun" : "one of the scene's file");
+                          "--lights '%s': its light '%s' has the name of %s; rename one of them", s->lights,
+                          others[i].name, cli_was_given("sun") ? "--sun" : "one of the scene's file");
         }
         made->lights[made->scene.light_count++] = others[i];
     }
@@ -252,14 +254,14 @@ static int join_lights(const cli_bake_settings *s, const vsh_light *others, size
 
 static int check_lights(const cli_bake_settings *s, const cli_bake_scene *made) {
     CLI_REFUSE_IF(cli_was_given("sun") && made->read != NULL,
-                  "--sun: the lights of a scene are in its file, %s", s->input);
+                  "--sun: not for a scene; add the sun to \"lights\" in %s", s->input);
     CLI_REFUSE_IF(s->lights != NULL && made->read != NULL && strcmp(s->lights, CLI_LIGHTS_OF_INPUT) == 0,
                   "--lights '%s': %s is a scene; name the file, or list it there under \"lights\"", s->lights,
                   s->input);
     CLI_REFUSE_IF(cli_was_given("sun-angle") && !cli_was_given("sun") && s->lights == NULL,
-                  "--sun-angle: there is no --sun");
+                  "--sun-angle: needs --sun X,Y,Z or --lights FILE");
     return cli_was_given("light-radius") && s->lights == NULL
-               ? cli_usage("--light-radius: there is no --lights")
+               ? cli_usage("--light-radius: needs --lights FILE")
                : CLI_OK;
 }
 
@@ -318,24 +320,25 @@ static int keep_error(vsh_scene *scene) {
     }
     return any_has(scene, VSH_METHOD_KEEPS_ERROR)
                ? CLI_OK
-               : cli_usage("--max-error: method %s keeps none; adaptive and exact do", method_of(scene));
+               : cli_usage("--max-error: method %s keeps no error; use adaptive or exact", method_of(scene));
 }
 
 /* Refuses options that the scene's methods do not use, and sets what follows from the options. */
 static int check_shade(const cli_bake_settings *s, vsh_scene *scene) {
-    CLI_REFUSE_IF(cli_was_given("ao-method") && !bakes_ao(scene), "--ao-method: there is no --ao");
+    CLI_REFUSE_IF(cli_was_given("ao-method") && !bakes_ao(scene), "--ao-method: needs --ao DISTANCE");
     scene->irradiance = scene->irradiance || cli_was_given("ambient");
-    CLI_REFUSE_IF(scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS),
-                  "--bent-normals: %s",
-                  scene->ao ? "AO by taps knows no directions; use cones or rays" : "there is no --ao");
-    CLI_REFUSE_IF(scene->has_ambient && !scene->irradiance,
-                  "%s: ambient is part of irradiance, which is not baked", s->input);
+    CLI_REFUSE_IF(
+        scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS), "--bent-normals: %s",
+        scene->ao ? "AO by taps has no directions; use --ao-method cones or rays" : "needs --ao DISTANCE");
+    CLI_REFUSE_IF(scene->has_ambient && !scene->irradiance, "%s: \"ambient\" needs \"irradiance\": true",
+                  s->input);
     CLI_TRY(cli_was_given("max-error") ? keep_error(scene) : CLI_OK);
     CLI_REFUSE_IF((cli_was_given("rays") || cli_was_given("error")) && !any_has(scene, VSH_METHOD_RAYS),
-                  "--%s: method %s takes no rays; rays, adaptive and exact do",
+                  "--%s: method %s casts no rays; use rays, adaptive or exact",
                   cli_was_given("rays") ? "rays" : "error", method_of(scene));
-    return scene->irradiance && scene->light_count == 0 ? cli_usage("--irradiance: there is no light")
-                                                        : CLI_OK;
+    return scene->irradiance && scene->light_count == 0
+               ? cli_usage("--irradiance: needs a light; give --sun X,Y,Z or --lights FILE")
+               : CLI_OK;
 }
 
 int cli_bake_check_work(const cli_bake_settings *s, const cli_bake_scene *made) {

@@ -512,8 +512,8 @@ def forecast_scene(scene: Scene, *, run: Optional[Run] = None, **options: Any) -
 
 
 def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) -> List[str]:
-    """The words stored in the first existing part of `shard_count` shards (0: as many as there are). Do not trust them: anybody may
-    have written the part."""
+    """The words stored in the first of `shard_count` parts (0: as many as there are), all of which must exist. Do not trust them:
+    anybody may have written the part."""
     words, count = call(lib.vsh_part_words, path_of(parts, "parts"), shard_count, OUT, OUT, run=run)
     owned = ffi.gc(words, lib.vsh_part_words_free)
     return [text(owned[i]) or "" for i in range(count)]
