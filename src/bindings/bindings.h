@@ -2,25 +2,23 @@
 
 #include "base/error.h"
 
-/* For bindings of other languages, which cannot call inline functions: what the …_default() or …_zero() of a
- * struct gives, by its name ("vsh_run"), into `size` bytes, as many as they know of it. 1; or 0 where there
- * is no such struct, or an argument is NULL. */
+/* Stores the defaults of a struct by its name ("vsh_run"), for languages that cannot call the inline
+ * …_default() and …_zero() functions. `size` is the struct's size as the caller knows it. Returns 0 if there
+ * is no such struct or an argument is NULL, else 1. */
 VSHI_SHARED int32_t vshi_struct_init(const char *name, void *made, size_t size);
 
-/* A progress callback that hands on to another from time to time: for languages whose callbacks take long, or
- * may be called by one thread alone. As vsh_run.progress goes vshi_progress_seldom(), as vsh_run.user the
- * address of this, which is one call's. */
+/* Passes progress on from time to time, for languages whose callbacks are slow or run in one thread only. Set
+ * vsh_run.progress to vshi_progress_seldom(), and vsh_run.user to one of these for each call. */
 typedef struct vshi_progress_filter {
     size_t struct_size;
-    vsh_progress_fn *progress; /* handed on to with `user`: 0 and 1 of a stage, and in between at most every
-                                  `seconds`; else work goes on. What it answers other than 0 stays. May be
-                                  NULL */
-    void *user;                /* of `progress` */
-    double seconds;            /* by the clock, ≥ 0 */
-    uint64_t thread;  /* nonzero: that thread alone hands on, (uint64_t)pthread_self(); the one that makes a
-                         call takes part in its work, if it has a stack of 4 MiB */
-    double last;      /* these two are kept by vshi_progress_seldom(): when it handed on last, 0: not yet; */
-    int32_t answered; /* and what the callback answered */
+    vsh_progress_fn *progress; /* called with `user` at 0 and 1 of a stage, and between them at most every
+                                * `seconds`. Its first answer other than 0 is repeated. May be NULL */
+    void *user;
+    double seconds;   /* ≥ 0 */
+    uint64_t thread;  /* (uint64_t)pthread_self() of the only thread to call `progress`; 0: any thread. The
+                       * thread that makes a call of the library takes part if its stack has 4 MiB */
+    double last;      /* time of the last call; 0: none yet. Set by vshi_progress_seldom(), as the next */
+    int32_t answered; /* the answer of `progress` */
 } vshi_progress_filter;
 
 static inline vshi_progress_filter vshi_progress_filter_default(void) {

@@ -139,9 +139,6 @@ bool cli_is_folder(const char *path);
 /* Returns the path with `end` instead of its last slashes. */
 const char *cli_end_path(const char *path, const char *end);
 
-/* Whether two paths lead to the same file, which need not exist. */
-bool cli_same_file(const char *a, const char *b);
-
 /* Refuses an output that is an input or another output. NULL paths are skipped; `scene` adds its own inputs,
  * and may be NULL. */
 int cli_check_apart(const char *const *outputs, size_t output_count, const char *const *inputs,

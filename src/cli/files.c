@@ -84,7 +84,8 @@ static void find_folder(const char *path, char folder[PATH_MAX]) {
 
 /* --- checks */
 
-bool cli_same_file(const char *a, const char *b) {
+/* Whether two paths lead to the same file, which need not exist. */
+static bool is_same_file(const char *a, const char *b) {
     struct stat one, other;
     const bool has_one = stat(a, &one) == 0;
     const bool has_other = stat(b, &other) == 0;
@@ -104,11 +105,11 @@ static int check_output(const char *const *outputs, size_t index, const char *co
                         size_t input_count) {
     const char *output = outputs[index];
     for (size_t i = 0; i < input_count; ++i) {
-        CLI_REFUSE_IF(inputs[i] != NULL && cli_same_file(output, inputs[i]),
+        CLI_REFUSE_IF(inputs[i] != NULL && is_same_file(output, inputs[i]),
                       "%s: the output is also an input: %s", output, inputs[i]);
     }
     for (size_t i = 0; i < index; ++i) {
-        CLI_REFUSE_IF(cli_same_file(output, outputs[i]), "%s: two outputs would be written to this file",
+        CLI_REFUSE_IF(is_same_file(output, outputs[i]), "%s: two outputs would be written to this file",
                       output);
     }
     return CLI_OK;

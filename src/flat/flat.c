@@ -654,10 +654,9 @@ static vsh_result place_grid(bake *b, vsh_error *error) {
 /* Runs fn over rows as a job of its own. */
 static vsh_result run_rows(const vsh_run *run, const char *stage, size_t rows, size_t units,
                            vshi_range_fn *fn, void *user, vsh_error *error) {
-    vshi_job *job = vshi_job_begin(run, stage, rows * units);
-    const vsh_result result = job != NULL
-                                  ? vshi_parallel_for(job, rows, 1, units, fn, user, error)
-                                  : vshi_fail(error, VSH_ERROR_MEMORY, "flat: the system refused memory");
+    vshi_job *job;
+    VSHI_TRY(vshi_job_open(&job, run, stage, rows * units, "flat", error));
+    const vsh_result result = vshi_parallel_for(job, rows, 1, units, fn, user, error);
     vshi_job_end(job);
     return result;
 }

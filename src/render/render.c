@@ -662,11 +662,9 @@ static vsh_result render_band(rendering *r, vshi_job *job, vsh_shade_stats *stat
 
 static vsh_result render_picture(rendering *r, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_TRY(allocate_band(r, error));
-    vshi_job *job =
-        vshi_job_begin(&r->run, "render", count_tiles(r->grid.rows) * count_tiles(r->grid.columns));
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory");
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_job_open(&job, &r->run, "render", count_tiles(r->grid.rows) * count_tiles(r->grid.columns),
+                           "render", error));
     vsh_result result = VSH_OK;
     begin_picture(r);
     const int32_t most = rows_at_once(&r->grid);
@@ -811,7 +809,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     if (light_count > 0 && r.fog.extinction > 0.0) {
         r.fog.sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, o.shade.frame);
         if (r.fog.sampler == NULL) {
-            VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "render: the system refused memory"));
+            VSHI_TRY_DONE(vshi_fail_memory(error, "render"));
         }
     }
     result = render_picture(&r, stats != NULL ? stats : &own, error);

@@ -354,10 +354,7 @@ vsh_result vshi_scene_layer_casters(const vsh_scene *scene, const vsh_assets *as
                                     const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
                                     vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(grid);
     *grid = NULL;
-    VSHI_NEEDS(scene);
-    VSHI_NEEDS(assets);
     const selection of = {.scene = scene, .assets = assets, .choice = OF_LAYER, .layer = layer};
     const vsh_grid_options options = choose_grid_options(scene, layer);
     return count_selected(&of) > 0 ? voxelise(&of, &options, run, grid, error) : VSH_OK;
@@ -496,10 +493,7 @@ done:
 vsh_result vshi_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
                                 const vsh_scene_layer *layer, const vsh_run *run, vshi_triangles **triangles,
                                 vsh_error *error) {
-    VSHI_NEEDS(triangles);
     *triangles = NULL;
-    VSHI_NEEDS(scene);
-    VSHI_NEEDS(assets);
     const selection of = {.scene = scene, .assets = assets, .choice = OF_LAYER, .layer = layer};
     return trace_casters(&of, run, triangles, NULL, error);
 }
@@ -512,12 +506,8 @@ vsh_result vshi_scene_caster_triangles(const vsh_scene *scene, const vsh_assets 
 
 vsh_result vshi_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                             vshi_triangles **triangles, vshi_solids **solids, vsh_error *error) {
-    VSHI_NEEDS(triangles);
-    VSHI_NEEDS(solids);
     *triangles = NULL;
     *solids = NULL;
-    VSHI_NEEDS(scene);
-    VSHI_NEEDS(assets);
     const selection of = {.scene = scene, .assets = assets, .choice = ALL};
     return trace_casters(&of, run, triangles, solids, error);
 }

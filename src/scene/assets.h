@@ -11,14 +11,13 @@
 #include <vdbshade/lightmap.h>
 #include <vdbshade/scene.h>
 
-/* The lights of a model's file (vshi_model_get_light()) as those of a scene. Lights of files have no size:
- * directional ones get `angle` (angular diameter, radians, 0 … π, excluded), points, which become spheres,
- * and spots `radius` (world units, ≥ 0) and VSH_FALLOFF_INVERSE_SQUARE. Colours are colour × intensity;
- * ranges are not taken. A name is the model's with _ for what a light's cannot have ("light" where it has
- * none), and _2, _3 … behind it where one before has it. `unit` as vsh_scene.unit. Free *lights, NULL where
- * *count is 0, with vsh_lights_free(). Safe for one model in any number of threads. Errors:
- * VSH_ERROR_ARGUMENT (NULL, an angle, a radius or a unit out of range, a light whose place is then none that
- * lights can have), VSH_ERROR_MEMORY. */
+/* Makes a scene's lights of those of a model's file. Lights of files have no size: directional ones get
+ * `angle` (angular diameter, radians, 0 … π, excluded); points, which become spheres, and spots get `radius`
+ * (world units, ≥ 0). Points and spots get VSH_FALLOFF_INVERSE_SQUARE; ranges are ignored. Colours are colour
+ * × intensity. In names, characters that a light's name cannot have become _; lights without a name are
+ * "light", and later lights of the same name end in _2, _3 … `unit` as in vsh_scene. Free *lights with
+ * vsh_lights_free(); it is NULL if *count is 0. Errors: VSH_ERROR_ARGUMENT (NULL, a number out of range, a
+ * light beyond the range of positions), VSH_ERROR_MEMORY. */
 vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                   vsh_light **lights, size_t *count, vsh_error *error);
 
@@ -26,11 +25,11 @@ vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double r
 typedef struct vshi_receiver_page {
     int32_t width; /* texels */
     int32_t height;
-    const char *object; /* the name of the object whose it is, "" where it has none; NULL: it is shared */
+    const char *object; /* name of the page's object, "" if it has none; NULL: objects share the page */
 } vshi_receiver_page;
 
-/* The same of the casters in `layer`, of its voxel size, or (NULL) of those in none; *grid is NULL where
- * there are none. Errors: as there; VSH_ERROR_ARGUMENT too where the scene has no such layer. */
+/* Voxelises the casters in `layer`, with its voxel size, or (NULL) those in no layer; *grid is NULL if there
+ * are none. Errors: as vsh_scene_casters(). */
 vsh_result vshi_scene_layer_casters(const vsh_scene *scene, const vsh_assets *assets,
                                     const vsh_scene_layer *layer, const vsh_run *run, vsh_grid **grid,
                                     vsh_error *error);
@@ -39,7 +38,7 @@ vsh_result vshi_scene_layer_casters(const vsh_scene *scene, const vsh_assets *as
  * Meshes and heightfields become triangles. Procedural shapes and spheres keep their exact form. Level sets,
  * masks and texts become the surface of their own voxels. *triangles is NULL if there are no casters. Free
  * the result with vshi_triangles_free(). Errors:
- * - VSH_ERROR_ARGUMENT: scene, assets or triangles NULL, run;
+ * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_INPUT: a transform that shears or scales a shape or a level set unevenly;
  * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
  *   vshi_triangles_create_beside(), and for level sets vsh_grid_unite() and vshi_field_create(). */
@@ -47,29 +46,23 @@ vsh_result vshi_scene_triangles(const vsh_scene *scene, const vsh_assets *assets
                                 const vsh_scene_layer *layer, const vsh_run *run, vshi_triangles **triangles,
                                 vsh_error *error);
 
-/* 1 where auto traces the casters in `layer`, or (NULL) in none. 0 where it marches them: one level set
- * alone, which keeps its voxels so, and masks and texts alone. Spheres in closed form and heightfields
- * that are marched do not count. Also 1 if there are no other casters. */
-int32_t vshi_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer);
-
-/* 1 where shadows of the casters in `layer`, or (NULL) in none, or AO are baked by a method that knows them
- * by their voxels alone; 0 where rays against triangles decide, and voxels only save rays. */
+/* Whether the casters in `layer`, or (NULL) in no layer, get shadows or AO by a method that only sees voxels.
+ * Otherwise rays against triangles decide, and voxels only save rays. */
 int32_t vshi_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer);
 
-/* What vshi_scene_resolution() gives where it is named. */
+/* Result of vshi_scene_resolution() if the scene or the layer sets the voxels. */
 enum { VSHI_RESOLUTION_NAMED = -1 };
 
-/* Voxels along the longest side of the casters in `layer`, or (NULL) in none, where `points` of receivers are
- * to be shaded by the scene's methods (docs/accuracy.md: how they are chosen). VSHI_RESOLUTION_NAMED: those
- * that the scene or the layer names; 0: none, rays against triangles are faster alone. It depends on what
- * the scene holds, and on nothing else. `assets` are those loaded for this scene. Cannot fail. */
+/* Chooses the voxels along the longest side of the casters in `layer`, or (NULL) in no layer, for `points` of
+ * receivers (docs/accuracy.md). VSHI_RESOLUTION_NAMED: the scene or the layer sets them; 0: no voxels, rays
+ * against triangles are faster. The result depends only on the scene and its `assets`. */
 int32_t vshi_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                               double points);
 
-/* A scene's casters as rays meet them, whatever their layers: the triangles of meshes and heightfields, and
- * procedural ones as they are, for vshi_trace_shadow() and vshi_trace_ao(). Each is NULL where there are
- * none. Free them with vshi_triangles_free() and vshi_solids_free(). Errors: VSH_ERROR_ARGUMENT (a pointer
- * NULL, run); as vshi_triangles_create() and vshi_solids_create(). */
+/* Makes all casters ready for vshi_trace_shadow() and vshi_trace_ao(), whatever their layers: meshes and
+ * heightfields as triangles, procedural shapes as solids. Each is NULL if there are none. Free them with
+ * vshi_triangles_free() and vshi_solids_free(). Errors: VSH_ERROR_ARGUMENT (run); as vshi_triangles_create()
+ * and vshi_solids_create(). */
 vsh_result vshi_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                             vshi_triangles **triangles, vshi_solids **solids, vsh_error *error);
 

@@ -366,7 +366,7 @@ vsh_result vshi_page_group_open(vshi_scene_bake *bake, size_t first, size_t coun
     if (scratch != NULL || output != NULL) {
         g->store.folder = scratch != NULL ? strdup(scratch) : vshi_copy_folder(output);
         if (g->store.folder == NULL) {
-            return vshi_fail(error, VSH_ERROR_MEMORY, "lightmaps: the system refused memory");
+            return vshi_fail_memory(error, "lightmaps");
         }
     }
     VSHI_TRY(vshi_allocate((void **)&g->pages, count, sizeof *g->pages, "lightmaps", error));
@@ -423,7 +423,7 @@ static vsh_result finish_page(vshi_page_group *g, vshi_scene_page *page, vsh_err
     const vshi_target *target = page->target;
     vsh_result result = vshi_page_finish(&page->page, &g->held, &page->baked, error);
     VSHI_TRY(vshi_name_file(target->receiver.path, result, error));
-    vshi_note_lit(page);
+    vshi_find_lit_objects(page);
     vshi_page_close_shots(&page->page);
     if (fixes_seams(&target->receiver)) {
         result = vshi_lightmap_fill_hidden(target->charts, &page->channels.lightmap, page->page.light_count,
@@ -509,10 +509,8 @@ static vsh_result bake_pages(vshi_scene_bake *bake, vsh_error *error) {
     for (size_t i = 0; i < bake->target_count; ++i) {
         total += vshi_charts_tiles(&bake->targets[i].charts->sorted);
     }
-    vshi_job *tiles = vshi_job_begin(&bake->run, "bake", total);
-    if (tiles == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "lightmaps: the system refused memory");
-    }
+    vshi_job *tiles;
+    VSHI_TRY(vshi_job_open(&tiles, &bake->run, "bake", total, "lightmaps", error));
     vsh_result result = VSH_OK;
     for (size_t first = 0, count; first < bake->target_count && result == VSH_OK; first += count) {
         count = count_together(bake, first);
@@ -520,7 +518,7 @@ static vsh_result bake_pages(vshi_scene_bake *bake, vsh_error *error) {
     }
     vshi_job_end(tiles);
     VSHI_TRY(result);
-    vshi_warn_hidden_lights(bake, &bake->run);
+    vshi_warn_lights(bake, &bake->run);
     return VSH_OK;
 }
 

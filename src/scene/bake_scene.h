@@ -33,10 +33,10 @@ typedef struct vshi_lit_page {
 } vshi_lit_page;
 
 /* The objects that a light or the sky reaches. */
-typedef struct vshi_lit {
+typedef struct vshi_lit_objects {
     const vsh_mesh *mesh; /* NULL: nothing yet */
     bool several;         /* more than one object */
-} vshi_lit;
+} vshi_lit_objects;
 
 typedef struct vshi_scene_bake {
     vsh_scene scene;
@@ -53,7 +53,7 @@ typedef struct vshi_scene_bake {
     vsh_provenance *provenance;    /* NULL if the caller receives the rows */
     vsh_bake_error *errors;        /* [error_count]: of each light, of AO, of the sky */
     size_t error_count;
-    vshi_lit *lit; /* [light_count + 1]: of each light, of the sky */
+    vshi_lit_objects *lit; /* [light_count + 1]: of each light, of the sky */
     vsh_bake_report report;
     vshi_lit_page *lit_pages; /* [lit_page_count]: of the current receiver */
     size_t lit_page_count;
@@ -226,11 +226,11 @@ vsh_result vshi_refuse_invalid(const vshi_target *target, const vsh_bake_stats *
 void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vsh_bake_stats *baked,
                      const vsh_run *run);
 
-/* Notes which lights, and whether the sky, reach the meshes of a baked page. */
-void vshi_note_lit(const vshi_scene_page *page);
+/* Adds the objects that lights and the sky reach on a baked page to bake->lit. */
+void vshi_find_lit_objects(const vshi_scene_page *page);
 
 /* Warns of lights, and of the sky, that reach no texel, or one object of several. */
-void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run);
+void vshi_warn_lights(const vshi_scene_bake *bake, const vsh_run *run);
 
 /* Warns of light that the file's integers cut. */
 void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const vsh_run *run);

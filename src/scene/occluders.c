@@ -85,12 +85,9 @@ static caster_counts count_casters(const vsh_scene *scene, const vsh_scene_layer
     return n;
 }
 
-/* A level set alone keeps its voxels when it is marched. Several, or one beside other casters, would have to
- * be resampled to the voxels of all. */
-int32_t vshi_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    if (scene == NULL) {
-        return 0;
-    }
+/* Whether auto traces the layer's casters. It marches masks and texts alone, and one level set alone, which
+ * keeps its voxels so: several, or one beside other casters, would be resampled to the voxels of all. */
+static bool is_traceable(const vsh_scene *scene, const vsh_scene_layer *layer) {
     const caster_counts n = count_casters(scene, layer);
     const bool alone = (n.level_sets == 0) != (n.outlines == 0) && n.level_sets <= 1;
     return !(n.meshes + n.solids == 0 && alone);
@@ -99,7 +96,7 @@ int32_t vshi_scene_traceable(const vsh_scene *scene, const vsh_scene_layer *laye
 /* Whether a method that shades the layer's casters has all of these VSH_METHOD_… traits, or (`has` false)
  * lacks one: a shadow method if there are lights, an AO method if AO is baked. */
 static bool any_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
-    const int32_t can = vshi_scene_traceable(scene, layer);
+    const int32_t can = is_traceable(scene, layer);
     const uint32_t shadow =
         vsh_shadow_method_traits(vshi_shadow_method_resolve(find_method(scene, layer), can));
     const uint32_t ao = vsh_ao_method_traits(vshi_ao_method_resolve(scene->shade.ao_method, can));
@@ -115,7 +112,7 @@ int32_t vshi_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer)
 static double estimate_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer) {
     /* over max_error, of all points; measured on the cloister, 0.6 units of AO and a sun of 5° */
     static const double OF_LIGHT = 0.14, OF_AO = 0.6;
-    const int32_t can = vshi_scene_traceable(scene, layer);
+    const int32_t can = is_traceable(scene, layer);
     const int32_t method = vshi_shadow_method_resolve(find_method(scene, layer), can);
     double rays = method == VSH_SHADOW_ADAPTIVE ? OF_LIGHT * (double)scene->light_count : 0.0;
     if (casts_ao(scene, layer) && vshi_ao_method_resolve(scene->shade.ao_method, can) == VSH_AO_ADAPTIVE) {
@@ -322,7 +319,7 @@ static vsh_result warn_of_voxels(const vsh_scene *scene, const vsh_assets *asset
 /* Default distance of points around the casters' box, its diagonals. */
 static const double WITHIN = 4.0;
 
-typedef struct making {
+typedef struct occluder_build {
     const vsh_scene *scene;
     const vsh_assets *assets;
     vsh_scene_occluders_options options;
@@ -331,10 +328,10 @@ typedef struct making {
     vshi_occluders_own own;
     vshi_layer *layers; /* [parts.layer_count] */
     vshi_occluder_parts parts;
-} making;
+} occluder_build;
 
 /* Chooses the reach for receivers in a box, or for points within a distance of the casters' box. */
-static double choose_reach(const making *m, const vsh_grid_info *info) {
+static double choose_reach(const occluder_build *m, const vsh_grid_info *info) {
     const vsh_scene_occluders_options *o = &m->options;
     if (o->receivers_min != NULL) {
         return find_reach(m->scene, info, o->receivers_min, o->receivers_max);
@@ -356,7 +353,7 @@ static double choose_reach(const making *m, const vsh_grid_info *info) {
     return reach > WITHIN * diagonal ? reach : vshi_field_options_default().reach;
 }
 
-static vshi_field_options choose_field_options(const making *m, const vsh_scene_layer *layer,
+static vshi_field_options choose_field_options(const occluder_build *m, const vsh_scene_layer *layer,
                                                const vsh_grid_info *voxels) {
     /* making a surface takes as long as the surface saves on this many rays an active voxel */
     static const double RAYS = 2.0;
@@ -374,7 +371,7 @@ static vshi_field_options choose_field_options(const making *m, const vsh_scene_
 }
 
 /* Makes a field of the layer's casters with so many voxels, or of the given level set. */
-static vsh_result create_field(making *m, const vsh_scene_layer *layer, int32_t resolution,
+static vsh_result create_field(occluder_build *m, const vsh_scene_layer *layer, int32_t resolution,
                                vsh_grid_info *voxels, vsh_field **field, vsh_error *error) {
     const double start = vshi_seconds();
     const vsh_grid *grid = layer == NULL ? m->options.grid : NULL;
@@ -397,8 +394,8 @@ static vsh_result create_field(making *m, const vsh_scene_layer *layer, int32_t 
 }
 
 /* Makes a layer's field; *field is NULL if there are no casters. */
-static vsh_result make_layer_field(making *m, const vsh_scene_layer *layer, const vshi_triangles *triangles,
-                                   vsh_field **field, vsh_error *error) {
+static vsh_result make_layer_field(occluder_build *m, const vsh_scene_layer *layer,
+                                   const vshi_triangles *triangles, vsh_field **field, vsh_error *error) {
     const double start = vshi_seconds(), voxelized = m->own.voxelize_s;
     const bool given = layer == NULL && m->options.grid != NULL;
     int32_t resolution = VSHI_RESOLUTION_NAMED;
@@ -410,8 +407,9 @@ static vsh_result make_layer_field(making *m, const vsh_scene_layer *layer, cons
     }
     if (resolution == 0 && triangles != NULL && m->options.voxels == 0) {
         VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
-        if (*field != NULL && layer == NULL) {
-            vshi_mesh_set_note(vshi_assets_set(m->assets), 0.0, 0.0, &m->voxel_run);
+        const vshi_mesh_set *set = vshi_assets_set(m->assets);
+        if (*field != NULL && layer == NULL && set->count > 0) {
+            vshi_mesh_set_note(set, 0.0, 0.0, &m->voxel_run);
         }
         return VSH_OK;
     }
@@ -431,7 +429,7 @@ static vsh_result make_layer_field(making *m, const vsh_scene_layer *layer, cons
 }
 
 /* Makes triangles if exact methods trace them. */
-static vsh_result make_triangles(making *m, const vsh_scene_layer *layer, vshi_triangles **triangles,
+static vsh_result make_triangles(occluder_build *m, const vsh_scene_layer *layer, vshi_triangles **triangles,
                                  vsh_error *error) {
     if (m->options.triangles == 0 || !any_method_is(m->scene, layer, VSH_METHOD_TRIANGLES, true)) {
         return VSH_OK;
@@ -443,7 +441,7 @@ static vsh_result make_triangles(making *m, const vsh_scene_layer *layer, vshi_t
 }
 
 /* Makes the casters that values are compared with, unless memory is short: baking needs none of it. */
-static vsh_result make_truth(making *m, vsh_error *error) {
+static vsh_result make_truth(occluder_build *m, vsh_error *error) {
     if (m->options.truth == 0 || !wants_truth(m->scene)) {
         return VSH_OK;
     }
@@ -472,7 +470,7 @@ static vshi_layer make_layer(const vsh_scene_layer *layer) {
 }
 
 /* Adds a caster without voxels, shaded as its layer is. `place`: of its triangles and field for AO rays. */
-static vsh_result add_direct(making *m, size_t index, size_t place, vsh_error *error) {
+static vsh_result add_direct(occluder_build *m, size_t index, size_t place, vsh_error *error) {
     const vsh_caster *caster = &m->scene->casters[index];
     const vsh_scene_layer *of = find_layer(m->scene, caster);
     vshi_layer *layer = &m->layers[m->parts.layer_count++];
@@ -490,7 +488,7 @@ static vsh_result add_direct(making *m, size_t index, size_t place, vsh_error *e
     return VSH_OK;
 }
 
-static vsh_result make_layers(making *m, vsh_error *error) {
+static vsh_result make_layers(occluder_build *m, vsh_error *error) {
     const vsh_scene *scene = m->scene;
     vshi_occluders_own *own = &m->own;
     size_t direct = 0;
@@ -532,7 +530,7 @@ static vsh_result make_layers(making *m, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result make_all(making *m, vsh_error *error) {
+static vsh_result make_all(occluder_build *m, vsh_error *error) {
     const double start = vshi_seconds();
     VSHI_TRY(make_triangles(m, NULL, &m->own.triangles, error));
     VSHI_TRY(make_truth(m, error));
@@ -552,10 +550,10 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
     *occluders = NULL;
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
-    making m = {.scene = scene,
-                .assets = assets,
-                .options = vsh_scene_occluders_options_default(),
-                .parts = {.field = NULL}};
+    occluder_build m = {.scene = scene,
+                        .assets = assets,
+                        .options = vsh_scene_occluders_options_default(),
+                        .parts = {.field = NULL}};
     VSHI_TRY(
         vshi_options_resolve(options, &m.options, sizeof m.options, "vsh_scene_occluders_options", error));
     if ((m.options.receivers_min == NULL) != (m.options.receivers_max == NULL)) {

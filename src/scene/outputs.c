@@ -21,10 +21,6 @@ enum {
     NAME_BYTES = 120        /* of an object in file names, which have 255 with number and ending */
 };
 
-static vsh_result refuse_memory(const char *what, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-}
-
 /* The part of a path after its folder. */
 static const char *find_name(const char *path) {
     const char *slash = strrchr(path, '/');
@@ -159,7 +155,7 @@ static vsh_result add_pages(vshi_scene_bake *bake, size_t index, vsh_error *erro
         target->output = receiver->output != NULL ? name_file(target, pages, receiver->output) : NULL;
         if ((info.object != NULL && target->object == NULL) ||
             (receiver->output != NULL && target->output == NULL)) {
-            return refuse_memory("lightmaps", error);
+            return vshi_fail_memory(error, "lightmaps");
         }
         lightmap->output = lit ? receiver->output : target->output;
         target->receiver = *receiver;
@@ -309,33 +305,6 @@ vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scen
     channels->lightmap.tint_by = scene->tint; /* of irradiance too */
     channels->lightmap.ambient = scene->has_ambient ? scene->ambient : NULL;
     return VSH_OK;
-}
-
-vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
-                                       vsh_error *error) {
-    const size_t texels = (size_t)channels->image.width * (size_t)rows;
-    size_t floats = 0;
-    for (size_t i = 0; i < channels->value_count; ++i) {
-        floats += channels->components[i] > 1 ? channels->components[i] : 0;
-    }
-    return vshi_allocate((void **)memory, texels, floats * sizeof(float), "rows of a lightmap", error);
-}
-
-void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
-                        const float **planes) {
-    const size_t width = (size_t)channels->image.width, texels = width * (size_t)rows;
-    for (size_t i = 0; i < channels->value_count; ++i) {
-        const size_t components = channels->components[i];
-        const float *values = channels->values[i] + components * width * (size_t)first;
-        for (size_t c = 0; c < components; ++c) {
-            *planes = components > 1 ? memory : values;
-            for (size_t t = 0; components > 1 && t < texels; ++t) {
-                memory[t] = values[components * t + c];
-            }
-            memory += components > 1 ? texels : 0;
-            ++planes;
-        }
-    }
 }
 
 void vshi_channels_free(vshi_channels *channels) {
@@ -619,7 +588,7 @@ static vsh_result write_picture(const vshi_scene_page *page, vsh_error *error) {
         return VSH_OK;
     }
     char *path = name_picture(page->bake, page->target, file);
-    VSHI_TRY_DONE(path != NULL ? VSH_OK : refuse_memory(file, error));
+    VSHI_TRY_DONE(path != NULL ? VSH_OK : vshi_fail_memory(error, file));
     VSHI_TRY_DONE(vshi_allocate((void **)&colours, 3 * room, sizeof *colours, file, error));
     const float *const planes[3] = {colours, colours + room, colours + 2 * room};
     const vsh_image image = {width, height, 3, NAMES, planes, NULL};
@@ -668,7 +637,7 @@ static vsh_result open_image(const vshi_scene_page *page, bool is_lit, vsh_image
     const size_t pages = vshi_assets_receiver(bake->assets, lightmap->receiver)->pages.count;
     char *path = is_lit ? name_file(page->target, pages, file) : strdup(file);
     if (path == NULL) {
-        return refuse_memory(file, error);
+        return vshi_fail_memory(error, file);
     }
     vsh_image_options options =
         is_lit ? vsh_image_options_default() : vshi_receiver_image(&page->target->receiver);
@@ -684,6 +653,33 @@ static vsh_result report_writing(const vsh_run *run, double fraction, vsh_error 
         return vshi_fail(error, VSH_ERROR_CANCELLED, "write: cancelled");
     }
     return VSH_OK;
+}
+
+vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
+                                       vsh_error *error) {
+    const size_t texels = (size_t)channels->image.width * (size_t)rows;
+    size_t floats = 0;
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        floats += channels->components[i] > 1 ? channels->components[i] : 0;
+    }
+    return vshi_allocate((void **)memory, texels, floats * sizeof(float), "rows of a lightmap", error);
+}
+
+void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
+                        const float **planes) {
+    const size_t width = (size_t)channels->image.width, texels = width * (size_t)rows;
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        const size_t components = channels->components[i];
+        const float *values = channels->values[i] + components * width * (size_t)first;
+        for (size_t c = 0; c < components; ++c) {
+            *planes = components > 1 ? memory : values;
+            for (size_t t = 0; components > 1 && t < texels; ++t) {
+                memory[t] = values[components * t + c];
+            }
+            memory += components > 1 ? texels : 0;
+            ++planes;
+        }
+    }
 }
 
 /* Hands the page's rows to the caller or to its image. */

@@ -1,4 +1,4 @@
-/* What an output was made of, as lines of text: settings as they are in force, and hashes of all inputs. */
+/* Provenance of an output as lines of text: the settings that made it, and hashes of all inputs. */
 #include "base/decimal.h"
 #include "base/file.h"
 #include "base/floats.h"
@@ -20,10 +20,6 @@ enum { NAME_SIZE = 96, LINE_SIZE = 512 };
 enum { HASH_UNITS = 1 << 30 }; /* of the job, for all inputs */
 enum { RAYS = 64 };            /* default of methods that keep no error */
 
-static vsh_result out_of_memory(const char *what, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
-}
-
 /* --- inputs: the files that a scene is made of */
 
 typedef struct file_list {
@@ -36,7 +32,7 @@ static vsh_result add_path(void *user, char *path, vsh_error *error) {
     file_list *inputs = user;
     bool known = false;
     if (path == NULL) {
-        return out_of_memory("inputs", error);
+        return vshi_fail_memory(error, "inputs");
     }
     for (size_t i = 0; i < inputs->count && !known; ++i) {
         known = strcmp(inputs->paths[i], path) == 0;
@@ -120,8 +116,7 @@ vsh_result vsh_scene_check_outputs(const vsh_scene *scene, const char *const *ou
             continue;
         }
         if (job == NULL) {
-            job = vshi_job_begin(&settings, "hash", 1);
-            VSHI_TRY_DONE(job != NULL ? VSH_OK : out_of_memory("inputs", error));
+            VSHI_TRY_DONE(vshi_job_open(&job, &settings, "hash", 1, "inputs", error));
             VSHI_TRY_DONE(find_inputs(scene, NULL, 0, &settings, job, &inputs, error));
         }
         VSHI_TRY_DONE(check_output(outputs[i], &status, &inputs, error));
@@ -139,7 +134,7 @@ struct vsh_provenance {
 };
 
 static vsh_result add(vsh_provenance *p, const char *name, const char *value, vsh_error *error) {
-    return vshi_attributes_add(&p->attributes, name, value) ? VSH_OK : out_of_memory("provenance", error);
+    return vshi_attributes_add(&p->attributes, name, value) ? VSH_OK : vshi_fail_memory(error, "provenance");
 }
 
 static const char MAX_ERROR[] = ", max error ", RAYS_GIVEN[] = " rays";
@@ -255,9 +250,9 @@ vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_
     VSHI_TRY(vshi_run_resolve(run, &settings, error));
     file_list inputs = {NULL, 0, 0};
     vsh_provenance *made = NULL;
-    vshi_job *job = vshi_job_begin(&settings, "hash", HASH_UNITS);
+    vshi_job *job;
     vsh_result result;
-    VSHI_TRY_DONE(job != NULL ? VSH_OK : out_of_memory("provenance", error));
+    VSHI_TRY(vshi_job_open(&job, &settings, "hash", HASH_UNITS, "provenance", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "provenance", error));
     VSHI_TRY_DONE(add_settings(made, &full, error));
     VSHI_TRY_DONE(find_inputs(full.scene, full.files, full.file_count, &settings, job, &inputs, error));

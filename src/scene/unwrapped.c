@@ -86,7 +86,7 @@ vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const vsh_mes
 
 /* --- meshes cut along their charts */
 
-typedef struct cutting {
+typedef struct mesh_cut {
     const vshi_asset_place *place; /* of the whole meshes */
     const vsh_atlas *atlas;
     size_t page_count;
@@ -97,21 +97,21 @@ typedef struct cutting {
     size_t *numbers;       /* of the model's meshes */
     size_t *atlas_numbers; /* of the atlas' meshes, which are the place's */
     uint32_t *memory;      /* unused elements for positions, normals and indices */
-} cutting;
+} mesh_cut;
 
-static void *take_memory(cutting *c, size_t count) {
+static void *allocate_elements(mesh_cut *c, size_t count) {
     c->memory += count;
     return c->memory - count;
 }
 
-static uint32_t find_page(const cutting *c, const vsh_atlas_mesh *view, size_t triangle) {
+static uint32_t find_page(const mesh_cut *c, const vsh_atlas_mesh *view, size_t triangle) {
     const uint32_t chart = view->charts[triangle];
     return chart == VSH_NO_CHART ? UINT32_MAX : vsh_atlas_charts(c->atlas)[chart].page;
 }
 
 /* Counts a mesh's triangles by pages. Triangles without a chart count on the first page with charts. Returns
  * the number of pages. */
-static size_t count_by_page(const cutting *c, const vsh_atlas_mesh *view, size_t *first) {
+static size_t count_by_page(const mesh_cut *c, const vsh_atlas_mesh *view, size_t *first) {
     size_t pages = 0, without = 0;
     memset(c->on_page, 0, c->page_count * sizeof *c->on_page);
     for (size_t t = 0; t < view->triangle_count; ++t) {
@@ -130,16 +130,16 @@ static size_t count_by_page(const cutting *c, const vsh_atlas_mesh *view, size_t
 }
 
 /* Whether a mesh counted by pages has a part on the page. */
-static bool has_part(const cutting *c, size_t pages, size_t first, size_t page) {
+static bool has_part(const mesh_cut *c, size_t pages, size_t first, size_t page) {
     return c->on_page[page] > 0 || (page == first && pages == 1);
 }
 
 /* Copies three floats a vertex in the atlas' order; NULL if there are none. */
-static const float *copy_vertices(cutting *c, const float *from, const vsh_atlas_mesh *view) {
+static const float *copy_vertices(mesh_cut *c, const float *from, const vsh_atlas_mesh *view) {
     if (from == NULL || view->vertex_count == 0) {
         return NULL;
     }
-    float *to = take_memory(c, 3 * (size_t)view->vertex_count);
+    float *to = allocate_elements(c, 3 * (size_t)view->vertex_count);
     for (size_t v = 0; v < view->vertex_count; ++v) {
         memcpy(to + 3 * v, from + 3 * (size_t)view->sources[v], 3 * sizeof *to);
     }
@@ -147,8 +147,8 @@ static const float *copy_vertices(cutting *c, const float *from, const vsh_atlas
 }
 
 /* Copies the triangles of a mesh that lie on one page. */
-static void copy_triangles(cutting *c, const vsh_atlas_mesh *view, size_t page, bool first, vsh_mesh *part) {
-    uint32_t *indices = take_memory(c, 3 * c->on_page[page]);
+static void copy_triangles(mesh_cut *c, const vsh_atlas_mesh *view, size_t page, bool first, vsh_mesh *part) {
+    uint32_t *indices = allocate_elements(c, 3 * c->on_page[page]);
     part->indices = indices;
     part->triangle_count = 0;
     for (size_t t = 0; t < view->triangle_count; ++t) {
@@ -160,7 +160,7 @@ static void copy_triangles(cutting *c, const vsh_atlas_mesh *view, size_t page, 
 }
 
 /* Adds a mesh's parts to the pages. */
-static void add_parts(cutting *c, size_t m) {
+static void add_parts(mesh_cut *c, size_t m) {
     const vsh_mesh *mesh = &c->place->meshes[m];
     const vsh_atlas_mesh view = vsh_atlas_mesh_view(c->atlas, m);
     size_t first;
@@ -187,7 +187,7 @@ static void add_parts(cutting *c, size_t m) {
 }
 
 /* Finds where each page's parts begin. Returns the elements of memory that all parts take. */
-static size_t count_parts(cutting *c, size_t *begins) {
+static size_t count_parts(mesh_cut *c, size_t *begins) {
     size_t elements = 0;
     for (size_t m = 0; m < c->place->count; ++m) {
         const vsh_mesh *mesh = &c->place->meshes[m];
@@ -212,7 +212,7 @@ static size_t count_parts(cutting *c, size_t *begins) {
 static vsh_result cut_meshes(vshi_asset_place *place, const vsh_run *run, vsh_error *error) {
     vshi_receiver_pages *pages = &place->pages;
     const size_t count = pages->count;
-    cutting c = {.place = place, .atlas = pages->atlas, .page_count = count};
+    mesh_cut c = {.place = place, .atlas = pages->atlas, .page_count = count};
     const vshi_array lists[] = {VSHI_ARRAY(c.on_page, count), VSHI_ARRAY(c.next, count),
                                 VSHI_ARRAY(pages->begins, count + 1)};
     vsh_result result;

@@ -192,13 +192,13 @@ static bool is_same(const vsh_mesh *a, const vsh_mesh *b) {
     return strcmp(find_object(a), find_object(b)) == 0;
 }
 
-/* Notes the lights that reach a texel of a mesh. */
-static void note_texel(const vshi_scene_page *page, size_t texel, const vsh_mesh *mesh) {
+/* Adds a texel of a mesh to the objects that each light reaches. */
+static void add_texel(const vshi_scene_page *page, size_t texel, const vsh_mesh *mesh) {
     const vsh_lightmap *planes = &page->channels.lightmap;
     const size_t lights = page->bake->scene.light_count;
     for (size_t i = 0; i <= lights; ++i) {
         const float *plane = i == lights ? planes->sky : planes->shadow != NULL ? planes->shadow[i] : NULL;
-        vshi_lit *so_far = &page->bake->lit[i];
+        vshi_lit_objects *so_far = &page->bake->lit[i];
         if (plane != NULL && !so_far->several && so_far->mesh != mesh && plane[texel] > 0.0f) {
             so_far->several = so_far->mesh != NULL && !is_same(so_far->mesh, mesh);
             so_far->mesh = mesh;
@@ -206,11 +206,11 @@ static void note_texel(const vshi_scene_page *page, size_t texel, const vsh_mesh
     }
 }
 
-void vshi_note_lit(const vshi_scene_page *page) {
+void vshi_find_lit_objects(const vshi_scene_page *page) {
     for (size_t i = 0; i < page->page.width * page->page.height; ++i) {
         const uint32_t mesh = page->page.mesh[i];
         if (mesh > 0 && page->channels.lightmap.coverage[i] == 1.0f) {
-            note_texel(page, i, &page->target->lightmap->meshes[mesh - 1]);
+            add_texel(page, i, &page->target->lightmap->meshes[mesh - 1]);
         }
     }
 }
@@ -226,7 +226,7 @@ static bool has_others(const vshi_scene_bake *bake, const vsh_mesh *mesh) {
     return others;
 }
 
-void vshi_warn_hidden_lights(const vshi_scene_bake *bake, const vsh_run *run) {
+void vshi_warn_lights(const vshi_scene_bake *bake, const vsh_run *run) {
     const size_t lights = bake->scene.light_count;
     for (size_t i = 0; i < lights + (bake->scene.planes.sky != VSH_UP_NONE); ++i) {
         const vsh_mesh *lit = bake->lit[i].mesh;
