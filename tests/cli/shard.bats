@@ -161,21 +161,15 @@ one_is() {
     untouched out.exr
 }
 
-@test "a damaged part is refused at whatever byte, and by name" {
-    unless_sanitized "a few hundred runs"
-    parts out.exr 2 "" box.obj "${SMALL[@]}" --size 96
+@test "a damaged part is refused by name" {
+    parts out.exr 2 "" box.obj "${SMALL[@]}"
     cp out.exr.2-of-2.part good
     size=$(stat -c %s good)
-    for at in 0 3 15 16 20 24 31 32 40 47 48 55 56 60 64 72 100 200 400 800 1200 $((size / 2)) $((size - 900)) $((size - 9)) $((size - 1)); do
-        cp good out.exr.2-of-2.part
-        printf '\xff' | dd of=out.exr.2-of-2.part bs=1 seek=$at conv=notrunc status=none
-        cmp -s good out.exr.2-of-2.part && continue
-        shade merge out.exr
-        [[ $status -eq 2 || $status -eq 3 || $status -eq 4 ]] || fail "byte $at"
-        [[ $stderr == *"out.exr.2-of-2.part: "* ]] || fail "byte $at"
-        [ ! -e out.exr ] || fail "byte $at"
+    for at in 200 $((size / 2)) $((size - 1)); do
+        perl -0777 -pe 'substr($_, '"$at"', 1) ^= "\x55"' good >out.exr.2-of-2.part
+        refuses 2 "out.exr.2-of-2.part: " -- merge out.exr
     done
-    for bytes in 0 1 20 55 56 63 64 500 $((size - 8)) $((size - 1)); do
+    for bytes in 0 63 $((size - 1)); do
         head -c "$bytes" good >out.exr.2-of-2.part
         refuses 2 "out.exr.2-of-2.part: " -- merge out.exr
     done
