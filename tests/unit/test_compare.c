@@ -185,11 +185,7 @@ TEST(each_measure_has_its_own_limit) {
         assert_int_equal(judge(&off), 1 << i);
         off.value[i] = NAN; /* does not apply */
         assert_int_equal(judge(&off), 0);
-        assert_int_equal(vsh_find_name(VSH_NAMES_MEASURE, vsh_get_name(VSH_NAMES_MEASURE, i)), i);
     }
-    assert_int_equal(vsh_find_name(VSH_NAMES_MEASURE, "rmse"), VSH_MEASURE_RMSE);
-    assert_int_equal(vsh_find_name(VSH_NAMES_MEASURE, "rms"), -1);
-    assert_null(vsh_get_name(VSH_NAMES_MEASURE, VSH_MEASURE_COUNT));
 }
 
 /* --- calls */

@@ -157,79 +157,60 @@ TEST(lights_have_names_that_a_channel_can_hold) {
 }
 
 TEST(every_constant_has_its_name_and_every_name_its_constant) {
-    enum { KINDS = VSH_NAMES_MEASURE + 1, MOST = 11 };
-    static const char *const names[KINDS][MOST] = {
-        [VSH_NAMES_ISA] = {[VSH_ISA_BEST] = "best",
-                           [VSH_ISA_BASE] = "base",
-                           [VSH_ISA_AVX2] = "avx2",
-                           [VSH_ISA_AVX512] = "avx512"},
-        [VSH_NAMES_SHADOW] = {[VSH_SHADOW_HARD] = "hard",
-                              [VSH_SHADOW_CLASSIC] = "classic",
-                              [VSH_SHADOW_PRACTICAL] = "practical",
-                              [VSH_SHADOW_IMPROVED] = "improved",
-                              [VSH_SHADOW_SMOOTH] = "smooth",
-                              [VSH_SHADOW_CONE] = "cone",
-                              [VSH_SHADOW_RAYS] = "rays",
-                              [VSH_SHADOW_ADAPTIVE] = "adaptive",
-                              [VSH_SHADOW_EXACT] = "exact",
-                              [VSH_SHADOW_AUTO] = "auto"},
-        [VSH_NAMES_AO] = {[VSH_AO_TAPS] = "taps",
-                          [VSH_AO_CONES] = "cones",
-                          [VSH_AO_RAYS] = "rays",
-                          [VSH_AO_ADAPTIVE] = "adaptive",
-                          [VSH_AO_EXACT] = "exact",
-                          [VSH_AO_AUTO] = "auto"},
-        [VSH_NAMES_SAMPLER] =
-            {[VSH_SAMPLER_SOBOL] = "sobol", [VSH_SAMPLER_WHITE] = "white", [VSH_SAMPLER_BLUE] = "blue"},
-        [VSH_NAMES_FALLOFF] = {[VSH_FALLOFF_NONE] = "none",
-                               [VSH_FALLOFF_INVERSE_SQUARE] = "inverse_square",
-                               [VSH_FALLOFF_QUADRATIC] = "quadratic"},
-        [VSH_NAMES_COLOR] = {[VSH_COLOR_AUTO] = "auto",
-                             [VSH_COLOR_LINEAR] = "linear",
-                             [VSH_COLOR_SRGB] = "srgb",
-                             [VSH_COLOR_ENCODED] = "encoded"},
-        [VSH_NAMES_ALIGN] =
-            {[VSH_ALIGN_LEFT] = "left", [VSH_ALIGN_CENTER] = "center", [VSH_ALIGN_RIGHT] = "right"},
-        [VSH_NAMES_ATLAS] = {[VSH_ATLAS_SHARED] = "shared", [VSH_ATLAS_OBJECTS] = "objects"},
-        [VSH_NAMES_COMBINE] = {[VSH_COMBINE_MULTIPLY] = "multiply", [VSH_COMBINE_MIN] = "min"},
-        [VSH_NAMES_TINT] =
-            {[VSH_TINT_NONE] = "none", [VSH_TINT_QUADRATIC] = "quadratic", [VSH_TINT_POWER] = "power"},
-        [VSH_NAMES_BENT] = {[VSH_BENT_WORLD] = "world", [VSH_BENT_TANGENT] = "tangent"},
-        [VSH_NAMES_UP] = {[VSH_UP_NONE] = "none",
-                          [VSH_UP_X] = "x",
-                          [VSH_UP_Y] = "y",
-                          [VSH_UP_Z] = "z",
-                          [VSH_UP_MINUS_X] = "-x",
-                          [VSH_UP_MINUS_Y] = "-y",
-                          [VSH_UP_MINUS_Z] = "-z"},
-        [VSH_NAMES_SEAMS] =
-            {[VSH_SEAMS_DEFAULT] = "default", [VSH_SEAMS_KEEP] = "keep", [VSH_SEAMS_FIX] = "fix"},
-        [VSH_NAMES_INSIDE] = {[VSH_INSIDE_NEAREST] = "nearest", [VSH_INSIDE_OFF] = "off"},
-        [VSH_NAMES_FLAT] =
-            {[VSH_FLAT_HARD] = "hard", [VSH_FLAT_CLASSIC] = "classic", [VSH_FLAT_EXACT] = "exact"},
-        [VSH_NAMES_FLAT_LIGHT] =
-            {[VSH_LIGHT_DIRECTIONAL] = "directional", [VSH_LIGHT_SPHERE] = "disc", [VSH_LIGHT_SPOT] = "spot"},
-        [VSH_NAMES_RECEIVER_UNWRAP] = {[VSH_RECEIVER_UNWRAP_DEFAULT] = "default",
-                                       [VSH_RECEIVER_UNWRAP_NEVER] = "never",
-                                       [VSH_RECEIVER_UNWRAP_AUTO] = "auto",
-                                       [VSH_RECEIVER_UNWRAP_ALWAYS] = "always"},
-        [VSH_NAMES_MEASURE] = {[VSH_MEASURE_NONFINITE] = "nonfinite",
-                               [VSH_MEASURE_SHIFT] = "shift",
-                               [VSH_MEASURE_PENUMBRA] = "penumbra",
-                               [VSH_MEASURE_LOST] = "lost",
-                               [VSH_MEASURE_GAINED] = "gained",
-                               [VSH_MEASURE_RMSE] = "rmse",
-                               [VSH_MEASURE_P99] = "p99",
-                               [VSH_MEASURE_MAX] = "max"},
-    };
-    for (int32_t kind = 0; kind < KINDS; ++kind) {
-        int32_t value = 0;
-        for (; names[kind][value] != NULL; ++value) {
-            assert_string_equal(vsh_get_name(kind, value), names[kind][value]);
-            assert_int_equal(vsh_find_name(kind, names[kind][value]), value);
+    enum { KINDS = VSH_NAMES_MEASURE + 1, MOST = 10 };
+    static const struct {
+        int32_t kind;
+        const char *names; /* of the values, in their order */
+        int32_t values[MOST];
+    } cases[] = {
+        {VSH_NAMES_ISA, "best base avx2 avx512", {VSH_ISA_BEST, VSH_ISA_BASE, VSH_ISA_AVX2, VSH_ISA_AVX512}},
+        {VSH_NAMES_SHADOW,
+         "hard classic practical improved smooth cone rays adaptive exact auto",
+         {VSH_SHADOW_HARD, VSH_SHADOW_CLASSIC, VSH_SHADOW_PRACTICAL, VSH_SHADOW_IMPROVED, VSH_SHADOW_SMOOTH,
+          VSH_SHADOW_CONE, VSH_SHADOW_RAYS, VSH_SHADOW_ADAPTIVE, VSH_SHADOW_EXACT, VSH_SHADOW_AUTO}},
+        {VSH_NAMES_AO,
+         "taps cones rays adaptive exact auto",
+         {VSH_AO_TAPS, VSH_AO_CONES, VSH_AO_RAYS, VSH_AO_ADAPTIVE, VSH_AO_EXACT, VSH_AO_AUTO}},
+        {VSH_NAMES_SAMPLER, "sobol white blue", {VSH_SAMPLER_SOBOL, VSH_SAMPLER_WHITE, VSH_SAMPLER_BLUE}},
+        {VSH_NAMES_FALLOFF,
+         "none inverse_square quadratic",
+         {VSH_FALLOFF_NONE, VSH_FALLOFF_INVERSE_SQUARE, VSH_FALLOFF_QUADRATIC}},
+        {VSH_NAMES_COLOR,
+         "auto linear srgb encoded",
+         {VSH_COLOR_AUTO, VSH_COLOR_LINEAR, VSH_COLOR_SRGB, VSH_COLOR_ENCODED}},
+        {VSH_NAMES_ALIGN, "left center right", {VSH_ALIGN_LEFT, VSH_ALIGN_CENTER, VSH_ALIGN_RIGHT}},
+        {VSH_NAMES_ATLAS, "shared objects", {VSH_ATLAS_SHARED, VSH_ATLAS_OBJECTS}},
+        {VSH_NAMES_COMBINE, "multiply min", {VSH_COMBINE_MULTIPLY, VSH_COMBINE_MIN}},
+        {VSH_NAMES_TINT, "none quadratic power", {VSH_TINT_NONE, VSH_TINT_QUADRATIC, VSH_TINT_POWER}},
+        {VSH_NAMES_BENT, "world tangent", {VSH_BENT_WORLD, VSH_BENT_TANGENT}},
+        {VSH_NAMES_UP,
+         "none x y z -x -y -z",
+         {VSH_UP_NONE, VSH_UP_X, VSH_UP_Y, VSH_UP_Z, VSH_UP_MINUS_X, VSH_UP_MINUS_Y, VSH_UP_MINUS_Z}},
+        {VSH_NAMES_SEAMS, "default keep fix", {VSH_SEAMS_DEFAULT, VSH_SEAMS_KEEP, VSH_SEAMS_FIX}},
+        {VSH_NAMES_INSIDE, "nearest off", {VSH_INSIDE_NEAREST, VSH_INSIDE_OFF}},
+        {VSH_NAMES_FLAT, "hard classic exact", {VSH_FLAT_HARD, VSH_FLAT_CLASSIC, VSH_FLAT_EXACT}},
+        {VSH_NAMES_FLAT_LIGHT,
+         "directional disc spot",
+         {VSH_LIGHT_DIRECTIONAL, VSH_LIGHT_SPHERE, VSH_LIGHT_SPOT}},
+        {VSH_NAMES_RECEIVER_UNWRAP,
+         "default never auto always",
+         {VSH_RECEIVER_UNWRAP_DEFAULT, VSH_RECEIVER_UNWRAP_NEVER, VSH_RECEIVER_UNWRAP_AUTO,
+          VSH_RECEIVER_UNWRAP_ALWAYS}},
+        {VSH_NAMES_MEASURE,
+         "nonfinite shift penumbra lost gained rmse p99 max",
+         {VSH_MEASURE_NONFINITE, VSH_MEASURE_SHIFT, VSH_MEASURE_PENUMBRA, VSH_MEASURE_LOST,
+          VSH_MEASURE_GAINED, VSH_MEASURE_RMSE, VSH_MEASURE_P99, VSH_MEASURE_MAX}}};
+    assert_int_equal(COUNT_OF(cases), KINDS);
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        const int32_t kind = cases[i].kind;
+        const char *names = cases[i].names;
+        char name[16];
+        int32_t count = 0;
+        for (int size; sscanf(names, "%15s%n", name, &size) == 1; names += size, ++count) {
+            assert_string_equal(vsh_get_name(kind, cases[i].values[count]), name);
+            assert_int_equal(vsh_find_name(kind, name), cases[i].values[count]);
         }
-        assert_true(value > 0);
-        assert_null(vsh_get_name(kind, value));
+        assert_null(vsh_get_name(kind, count));
         assert_null(vsh_get_name(kind, -1));
         assert_null(vsh_get_name(kind, INT32_MAX));
         assert_int_equal(vsh_find_name(kind, ""), -1);
