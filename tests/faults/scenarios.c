@@ -19,11 +19,8 @@ static void parts_fill(float *values, size_t count) {
 
 /* A cube of 1. */
 static vsh_mesh cube(void) {
-    static const float corners[] = {0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 1, 1, 1, 0, 1, 1};
-    static const uint32_t indices[] = {0, 2, 1, 0, 3, 2, 4, 5, 6, 4, 6, 7, 0, 1, 5, 0, 5, 4,
-                                       3, 7, 6, 3, 6, 2, 0, 4, 7, 0, 7, 3, 1, 2, 6, 1, 6, 5};
-    return (vsh_mesh){
-        .name = "box", .positions = corners, .indices = indices, .vertex_count = 8, .triangle_count = 12};
+    static float corners[24];
+    return box_mesh(corners, (const double[3]){0, 0, 0}, (const double[3]){1, 1, 1});
 }
 
 /* The cube in a few voxels. */
@@ -345,10 +342,6 @@ enum { FLAT_TEXELS = 64 };
 /* Of the package fonts-dejavu-core. */
 #define FONT "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
 
-static void free_image(vsh_image_file **file) {
-    vsh_image_free(*file);
-}
-
 static vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     OWNED(vsh_model) *model = NULL;
     OWNED(vsh_grid) *grid = NULL;
@@ -489,7 +482,7 @@ WRITES_IMAGE(write_tif, "out.tif")
 
 static vsh_result read_images(const vsh_run *run, vsh_error *error) {
     for (size_t i = 0; i < IMAGES; ++i) {
-        FREED_BY(free_image) vsh_image_file *file = NULL;
+        OWNED(vsh_image_file) *file = NULL;
         MAKE(file, vsh_image_read(images[i], run, &file, error));
     }
     return VSH_OK;

@@ -1,7 +1,6 @@
 #include "metrics.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 
 static int compare(const void *a, const void *b) {
@@ -52,10 +51,4 @@ truth_metrics truth_compare(size_t count, const float *values, const float *trut
     }
     free(errors);
     return metrics;
-}
-
-void truth_metrics_print(const char *what, const truth_metrics *metrics) {
-    printf("%-24s n %zu  rmse %.4f  penumbra %.4f (n %zu)  bias %+.4f  p95 %.4f  p99 %.4f  max %.3f\n", what,
-           metrics->count, metrics->rmse, metrics->penumbra_rmse, metrics->penumbra, metrics->bias,
-           metrics->p95, metrics->p99, metrics->max);
 }

@@ -17,6 +17,3 @@ typedef struct truth_metrics {
 
 /* Compares where mask > 0 (NULL: everywhere). All zero where nothing is compared or memory is short. */
 truth_metrics truth_compare(size_t count, const float *values, const float *truth, const float *mask);
-
-/* One line: "n … rmse … penumbra … bias … p95 … p99 … max …", under `what`, on standard output. */
-void truth_metrics_print(const char *what, const truth_metrics *metrics);

@@ -105,28 +105,15 @@ static inline void write_glb(const asset *a, const char *name) {
     memcpy(all + 20, text, strlen(text));
     memcpy(all + 20 + length, chunk, sizeof chunk);
     memcpy(all + 28 + length, a->bytes, a->size);
-    write_bytes(name, all, head[2]);
+    write_all(at(name), all, head[2]);
 }
 
 /* --- reading */
 
-static inline unsigned char *load_bytes(const char *path, size_t *size) {
-    FILE *file = fopen(path, "rb");
-    assert_that(file != NULL, "%s is not there", path);
-    assert_int_equal(fseek(file, 0, SEEK_END), 0);
-    *size = (size_t)ftell(file);
-    rewind(file);
-    unsigned char *bytes = malloc(*size + 1);
-    assert_int_equal(fread(bytes, 1, *size, file), *size);
-    bytes[*size] = '\0';
-    fclose(file);
-    return bytes;
-}
-
 /* A GLB, or a glTF with its one buffer beside it; others' buffers in data URIs are not read. */
 static inline asset load_asset(const char *path) {
-    size_t size;
-    unsigned char *bytes = load_bytes(path, &size);
+    unsigned char *bytes;
+    const size_t size = read_all(path, &bytes);
     asset a = {NULL, NULL, 0};
     json_error_t error;
     if (size > 20 && memcmp(bytes, "glTF", 4) == 0) {
@@ -144,7 +131,7 @@ static inline asset load_asset(const char *path) {
         a.root = json_loadb((char *)bytes, size, 0, &error);
         assert_non_null(text_at(&a, "buffers/0/uri"));
         FREED char *beside = vshi_uri_path(path, text_at(&a, "buffers/0/uri"));
-        a.bytes = load_bytes(beside, &a.size);
+        a.size = read_all(beside, &a.bytes);
     }
     free(bytes);
     assert_that(a.root != NULL, "%s: %s", path, error.text);
@@ -357,14 +344,14 @@ static inline void free_lit(vsh_lit_mesh *meshes, size_t count) {
 }
 
 static inline void remove_file(const char *name) {
-    assert_int_equal(unlink(path_of(name).text), 0);
+    assert_int_equal(unlink(at(name)), 0);
 }
 
 /* A file of tests/models lit as "out.glb", without an atlas by its own UVs; read again. */
 static inline asset light_model(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                                 const vsh_lit_options *options) {
-    write_lit(path, model, meshes, options, path_of("out.glb").text);
-    asset out = load_asset(path_of("out.glb").text);
+    write_lit(path, model, meshes, options, at("out.glb"));
+    asset out = load_asset(at("out.glb"));
     remove_file("out.glb");
     return out;
 }

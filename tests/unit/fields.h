@@ -7,8 +7,8 @@
 enum { MAX_SOLIDS = 16 };
 
 /* The scene as a tree of unions, moved by `offset` and scaled by `scale` (in that order). */
-static inline vsh_grid *grid_of_moved(truth_scene scene, double voxel, double scale, const double offset[3]) {
-    vsh_sdf_node nodes[2 * MAX_SOLIDS];
+static inline vsh_sdf tree_of_moved(truth_scene scene, double scale, const double offset[3],
+                                    vsh_sdf_node nodes[2 * MAX_SOLIDS]) {
     size_t count = 0;
     int32_t last = -1;
     assert_true(scene.count > 0 && scene.count <= MAX_SOLIDS);
@@ -33,7 +33,12 @@ static inline vsh_grid *grid_of_moved(truth_scene scene, double voxel, double sc
         }
         last = (int32_t)count - 1;
     }
-    const vsh_sdf sdf = {nodes, count};
+    return (vsh_sdf){nodes, count};
+}
+
+static inline vsh_grid *grid_of_moved(truth_scene scene, double voxel, double scale, const double offset[3]) {
+    vsh_sdf_node nodes[2 * MAX_SOLIDS];
+    const vsh_sdf sdf = tree_of_moved(scene, scale, offset, nodes);
     return grid_from_sdf(&sdf, scale * voxel);
 }
 
@@ -44,6 +49,28 @@ static inline vsh_grid *grid_of(truth_scene scene, double voxel) {
 
 static inline vsh_field *field_of(truth_scene scene, double voxel, double reach) {
     return field_of_grid(grid_of(scene, voxel), reach);
+}
+
+/* Turns v by an angle about an axis: Rodrigues' formula. */
+static inline void turn_about(const double axis[3], double angle, const double v[3], double out[3]) {
+    const double length = length3(axis), c = cos(angle), s = sin(angle), along = dot3(axis, v) / length;
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        out[i] = c * v[i] + (s * (axis[j] * v[k] - axis[k] * v[j]) + (1.0 - c) * along * axis[i]) / length;
+    }
+}
+
+/* The transform that turns by an angle about an axis, and then moves. */
+static inline void make_turn(const double axis[3], double angle, const double by[3], double transform[12]) {
+    for (int column = 0; column < 3; ++column) {
+        const double unit[3] = {column == 0, column == 1, column == 2};
+        double v[3];
+        turn_about(axis, angle, unit, v);
+        for (int row = 0; row < 3; ++row) {
+            transform[4 * row + column] = v[row];
+        }
+        transform[4 * column + 3] = by[column];
+    }
 }
 
 /* A number in [0, 1), counted, not drawn: the same in each run and on each machine (splitmix64). */

@@ -3,24 +3,30 @@
 
 #include "testing.h"
 
-#define COUNT_OF(array) (sizeof(array) / sizeof((array)[0]))
+/* Lets type_info(object) return what type_get_info() fills. */
+#define INFO(type, name)                                                                                     \
+    static inline type##_info name(const type *object) {                                                     \
+        type##_info info;                                                                                    \
+        type##_get_info(object, &info);                                                                      \
+        return info;                                                                                         \
+    }
 
-/* Six indices of two triangles whose four corners go around. */
-static const uint32_t QUAD_ORDER[6] = {0, 1, 2, 0, 2, 3};
+INFO(vsh_field, field_info)
+INFO(vsh_grid, grid_info)
+INFO(vsh_occluders, occluders_info)
+INFO(vsh_volume, volume_info)
+INFO(vsh_voxels, voxels_info)
 
-/* `uvs` NULL: none. */
-static inline vsh_mesh mesh_of_arrays(const char *name, const float *positions, const float *uvs,
-                                      size_t vertices, const uint32_t *indices, size_t triangles) {
-    return (vsh_mesh){.name = name,
-                      .positions = positions,
-                      .uvs = uvs,
-                      .indices = indices,
-                      .vertex_count = vertices,
-                      .triangle_count = triangles};
+/* The square [-1, 1]² at y = 0, facing up; u runs along x, v along -z. `uvs` NULL: all of the lightmap. */
+static inline vsh_mesh floor_mesh(const float *uvs) {
+    static const float corners[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1};
+    return quad_mesh("floor", corners, uvs != NULL ? uvs : QUAD_UVS);
 }
 
-static inline vsh_mesh quad_of_arrays(const char *name, const float positions[12], const float uvs[8]) {
-    return mesh_of_arrays(name, positions, uvs, 4, QUAD_ORDER, 2);
+/* A plate of 2 × 2, 0.2 thick, whose top is at y = 1. */
+static inline vsh_mesh plate_mesh(void) {
+    static float corners[24];
+    return box_mesh(corners, (const double[]){-1.0, 0.8, -1.0}, (const double[]){1.0, 1.0, 1.0});
 }
 
 /* --- level sets */
@@ -42,10 +48,7 @@ static inline vsh_sdf_node operation_node(int32_t operation, int32_t left, int32
 }
 
 static inline vsh_grid *grid_from_sdf(const vsh_sdf *sdf, double voxel) {
-    const vsh_grid_options options = with_voxel(voxel);
-    vsh_grid *grid = NULL;
-    assert_ok(vsh_grid_from_sdf(sdf, &options, NULL, &grid, &failure));
-    return grid;
+    return grid_of_tree(sdf->nodes, sdf->node_count, with_voxel(voxel));
 }
 
 static inline vsh_grid *grid_from_distance(const vsh_distance *distance, double voxel) {
@@ -62,12 +65,6 @@ static inline vsh_grid *grid_from_meshes(const vsh_mesh *meshes, size_t count, d
     return grid;
 }
 
-static inline vsh_grid_info grid_info(const vsh_grid *grid) {
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    return info;
-}
-
 /* Frees the grid. Reach 0: the default one. */
 static inline vsh_field *field_of_grid(vsh_grid *grid, double reach) {
     vshi_field_options options = vshi_field_options_default();
@@ -76,12 +73,6 @@ static inline vsh_field *field_of_grid(vsh_grid *grid, double reach) {
     assert_ok(vshi_field_create(grid, &options, NULL, &field, &failure));
     vsh_grid_free(grid);
     return field;
-}
-
-static inline vsh_field_info field_info(const vsh_field *field) {
-    vsh_field_info info;
-    vsh_field_get_info(field, &info);
-    return info;
 }
 
 static inline float distance_at(const vsh_field *field, const double position[3]) {

@@ -1,7 +1,7 @@
 /* Small model files of every format, for their tests. */
 #pragma once
 
-#include "testing.h"
+#include "folder.h"
 
 #include "geometry/mesh.h"
 
@@ -12,33 +12,9 @@ const char *__lsan_default_suppressions(void) {
     return "leak:libassimp.so\n";
 }
 
-static char folder[256];
-
-static inline int make_folder(void **state) {
-    const char *place = getenv("TMPDIR");
-    snprintf(folder, sizeof folder, "%s/vdbshade-model-XXXXXX", place != NULL ? place : ".");
-    return mkdtemp(folder) == NULL;
-}
-
-static inline int remove_folder(void **state) {
-    return rmdir(folder); /* fails where a test left a file */
-}
-
-typedef struct file_path {
-    char text[512];
-} file_path;
-
-static inline file_path path_of(const char *name) {
-    file_path path;
-    snprintf(path.text, sizeof path.text, "%s/%s", folder, name);
-    return path;
-}
-
-static inline void write_bytes(const char *name, const void *bytes, size_t size) {
-    FILE *file = fopen(path_of(name).text, "wb");
-    assert_non_null(file);
-    assert_int_equal(fwrite(bytes, 1, size, file), size);
-    assert_int_equal(fclose(file), 0);
+/* Fails where a test left a file. */
+static inline int remove_empty_folder(void **state) {
+    return rmdir(folder);
 }
 
 static char warnings[4096];
@@ -54,9 +30,9 @@ static inline vsh_result read_bytes(const char *name, const void *bytes, size_t 
     run.warning = keep_warning;
     run.notes = 1;
     warnings[0] = '\0';
-    write_bytes(name, bytes, size);
-    const vsh_result result = vsh_model_read(path_of(name).text, &run, model, error);
-    assert_int_equal(unlink(path_of(name).text), 0);
+    write_all(at(name), bytes, size);
+    const vsh_result result = vsh_model_read(at(name), &run, model, error);
+    assert_int_equal(unlink(at(name)), 0);
     return result;
 }
 

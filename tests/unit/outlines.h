@@ -8,10 +8,14 @@
 /* Of the package fonts-dejavu-core. */
 #define FONT "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf"
 
-static inline vsh_outline *polygon(const double *points, size_t count) {
+static inline vsh_outline *polygons(const double *points, const size_t *counts, size_t count) {
     vsh_outline *outline = NULL;
-    assert_ok(vsh_outline_from_polygons(points, &count, 1, NULL, &outline, &failure));
+    assert_ok(vsh_outline_from_polygons(points, counts, count, NULL, &outline, &failure));
     return outline;
+}
+
+static inline vsh_outline *polygon(const double *points, size_t count) {
+    return polygons(points, &count, 1);
 }
 
 static inline vsh_outline *box(double x0, double y0, double x1, double y1) {
@@ -19,10 +23,11 @@ static inline vsh_outline *box(double x0, double y0, double x1, double y1) {
     return polygon(points, 4);
 }
 
-static inline vsh_outline *text(const char *letters, double height) {
+/* Lines of the height 1. */
+static inline vsh_outline *lines_of(const char *letters, int32_t align) {
     vsh_text_options options = vsh_text_options_default();
-    options.height = height;
-    options.align = VSH_ALIGN_CENTER;
+    options.height = 1.0;
+    options.align = align;
     vsh_outline *outline = NULL;
     assert_ok(vshi_outline_from_text(letters, FONT, &options, NULL, &outline, &failure));
     return outline;

@@ -4,10 +4,9 @@
 #include "assets.h"
 
 static inline void assert_file(const char *name, const void *expected, size_t expected_size) {
-    size_t size;
-    FREED unsigned char *bytes = load_bytes(path_of(name).text, &size);
-    assert_int_equal(size, expected_size);
-    assert_memory_equal(bytes, expected, size);
+    FREED unsigned char *bytes = NULL;
+    assert_int_equal(read_all(at(name), &bytes), expected_size);
+    assert_memory_equal(bytes, expected, expected_size);
 }
 
 enum { SIDE = 5, QUADS = (SIDE - 1) * (SIDE - 1), VERTICES = SIDE * SIDE, INDICES = 6 * QUADS };
@@ -231,16 +230,16 @@ typedef struct lighting {
 static inline lighting begin_lighting(asset in, bool split) {
     lighting l = {.in = in};
     write_glb(&in, "in.glb");
-    write_bytes("tile one.png", white_png, sizeof white_png);
-    l.model = read_model(path_of("in.glb").text);
+    write_all(at("tile one.png"), white_png, sizeof white_png);
+    l.model = read_model(at("in.glb"));
     l.lit = make_all_lit(l.model, split);
     return l;
 }
 
 static inline void light(lighting *l, const vsh_lit_options *options) {
     free_asset(&l->out);
-    write_lit(path_of("in.glb").text, l->model, l->lit, options, path_of("out.glb").text);
-    l->out = load_asset(path_of("out.glb").text);
+    write_lit(at("in.glb"), l->model, l->lit, options, at("out.glb"));
+    l->out = load_asset(at("out.glb"));
 }
 
 /* By one white image. */
@@ -257,7 +256,7 @@ static inline void end_lighting(lighting *l) {
     vsh_model_free(l->model);
     free_asset(&l->in);
     free_asset(&l->out);
-    unlink(path_of("out.glb").text);
+    unlink(at("out.glb"));
     remove_file("tile one.png");
     remove_file("in.glb");
 }

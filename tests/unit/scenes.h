@@ -11,14 +11,4 @@ static inline vsh_scene *parse(const char *path, const char *text) {
     return scene;
 }
 
-static inline char *read_text(const char *path, size_t *size) {
-    FILE *file = fopen(path, "rb");
-    assert_non_null(file);
-    char *text = calloc(1, 1 << 16);
-    *size = fread(text, 1, (1 << 16) - 1, file);
-    fclose(file);
-    assert_true(*size > 0);
-    return text;
-}
-
 static const char seeds_path[] = VSH_ASSETS "/seeds.json";

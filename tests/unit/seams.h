@@ -19,7 +19,6 @@ static inline charts_mesh *new_mesh(void) {
 
 /* A quad in the plane z = 0 between two corners, anticlockwise; uv[k]: of its corner k, texels. */
 static inline void add_quad(charts_mesh *m, const double corner[4][3], const double texel[4][2]) {
-    static const uint32_t order[6] = {0, 1, 2, 0, 2, 3};
     const uint32_t first = (uint32_t)m->mesh.vertex_count;
     for (size_t k = 0; k < 4; ++k) {
         for (size_t c = 0; c < 3; ++c) {
@@ -29,7 +28,7 @@ static inline void add_quad(charts_mesh *m, const double corner[4][3], const dou
         m->uvs[2 * (first + k) + 1] = (float)(1.0 - texel[k][1] / SIDE);
     }
     for (size_t k = 0; k < 6; ++k) {
-        m->indices[3 * m->mesh.triangle_count + k] = first + order[k];
+        m->indices[3 * m->mesh.triangle_count + k] = first + QUAD_INDICES[k];
     }
     m->mesh.vertex_count += 4;
     m->mesh.triangle_count += 2;
@@ -78,8 +77,7 @@ static inline float *new_plane(float value) {
 
 /* The same values whenever a seed is the same. */
 static inline float random_value(uint32_t *state) {
-    *state = *state * 1664525u + 1013904223u;
-    return (float)(*state >> 8) * 0x1p-24f;
+    return (float)next_random(state);
 }
 
 static inline float *random_plane(uint32_t seed) {

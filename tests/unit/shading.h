@@ -37,10 +37,32 @@ static inline vsh_shade_stats shade_points(const vsh_occluders *occluders, const
 
 static inline vsh_shade_stats shade_ao_points(const vsh_occluders *occluders, const vsh_points *points,
                                               const vsh_shade_options *options, const vsh_run *run,
-                                              float *values) {
+                                              float *values, float *deviation) {
     vsh_shade_stats stats = vsh_shade_stats_zero();
-    assert_ok(vsh_shade_ao(occluders, points, options, run, values, NULL, NULL, &stats, &failure));
+    assert_ok(vsh_shade_ao(occluders, points, options, run, values, deviation, NULL, &stats, &failure));
     return stats;
+}
+
+/* Puts point i at (x, y, z), with its normal up. */
+static inline void put_point(double *positions, float *normals, size_t i, double x, double y, double z) {
+    memcpy(positions + 3 * i, (const double[]){x, y, z}, sizeof(double[3]));
+    memcpy(normals + 3 * i, (const float[]){0.0f, 1.0f, 0.0f}, sizeof(float[3]));
+}
+
+/* Puts side × side points over [-half, half]² at a height. */
+static inline void put_square(size_t side, double half, double height, double *positions, float *normals) {
+    for (size_t i = 0; i < side * side; ++i) {
+        const double x = ((double)(i % side) + 0.5) / (double)side,
+                     z = ((double)(i / side) + 0.5) / (double)side;
+        put_point(positions, normals, i, half * (2.0 * x - 1.0), height, half * (2.0 * z - 1.0));
+    }
+}
+
+static inline vsh_query *query_of(const vsh_occluders *occluders, const vsh_light *lights, size_t count,
+                                  const vsh_shade_options *options) {
+    vsh_query *query = NULL;
+    assert_ok(vsh_query_create(occluders, lights, count, options, &query, &failure));
+    return query;
 }
 
 static inline vsh_shade_stats shadows_by(const vsh_occluders *occluders, const vsh_light *light,
@@ -91,13 +113,22 @@ static inline void floor_texels(size_t size, double *positions, float *normals) 
     const size_t stride = 512 / size;
     for (size_t row = 0; row < size; ++row) {
         for (size_t column = 0; column < size; ++column) {
-            double *p = positions + 3 * (row * size + column);
-            float *n = normals + 3 * (row * size + column);
-            p[0] = -2.5 + 5.0 * ((double)(column * stride) + 0.5) / 512.0;
-            p[1] = 0.001;
-            p[2] = -2.5 + 5.0 * ((double)(row * stride) + 0.5) / 512.0;
-            n[0] = n[2] = 0.0f;
-            n[1] = 1.0f;
+            put_point(positions, normals, row * size + column,
+                      -2.5 + 5.0 * ((double)(column * stride) + 0.5) / 512.0, 0.001,
+                      -2.5 + 5.0 * ((double)(row * stride) + 0.5) / 512.0);
+        }
+    }
+}
+
+/* The same, but every third one lies in the air or inside a solid, and its normal points anywhere. */
+static inline void scattered_texels(size_t size, uint64_t counter, double *positions, float *normals) {
+    floor_texels(size, positions, normals);
+    for (size_t i = 0; i < size * size; i += 3) {
+        double n[3];
+        random_direction(&counter, n);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            positions[3 * i + axis] = axis == 1 ? between(&counter, -1.0, 3.0) : between(&counter, -4.0, 4.0);
+            normals[3 * i + axis] = (float)n[axis];
         }
     }
 }

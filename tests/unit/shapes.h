@@ -17,11 +17,7 @@ static inline shape *shape_new(void) {
 }
 
 static inline vsh_mesh shape_mesh(const shape *s, const char *name) {
-    return (vsh_mesh){.name = name,
-                      .positions = &s->positions[0][0],
-                      .indices = &s->indices[0][0],
-                      .vertex_count = s->vertices,
-                      .triangle_count = s->triangles};
+    return mesh_of_arrays(name, s->positions[0], NULL, s->vertices, s->indices[0], s->triangles);
 }
 
 static inline uint32_t shape_vertex(shape *s, double x, double y, double z) {
@@ -44,6 +40,15 @@ static inline void shape_quad(shape *s, uint32_t a, uint32_t b, uint32_t c, uint
     shape_triangle(s, a, c, d);
 }
 
+/* A quad with vertices of its own. */
+static inline void shape_quad_at(shape *s, const double corners[4][3]) {
+    const uint32_t first = (uint32_t)s->vertices;
+    for (int k = 0; k < 4; ++k) {
+        shape_vertex(s, corners[k][0], corners[k][1], corners[k][2]);
+    }
+    shape_quad(s, first, first + 1, first + 2, first + 3);
+}
+
 /* Turns the triangles from `first` on over. */
 static inline void shape_turn(shape *s, size_t first) {
     for (size_t i = first; i < s->triangles; ++i) {
@@ -61,13 +66,11 @@ static inline void shape_box(shape *s, const double low[3], const double high[3]
                                      {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
     for (int f = 0; f < 6; ++f) {
         if ((sides >> f & 1) != 0) {
-            uint32_t v[4];
-            for (int k = 0; k < 4; ++k) {
-                const int c = corner[f][k];
-                v[k] = shape_vertex(s, c & 1 ? high[0] : low[0], c & 2 ? high[1] : low[1],
-                                    c & 4 ? high[2] : low[2]);
+            double at[4][3];
+            for (int i = 0; i < 12; ++i) {
+                at[i / 3][i % 3] = (corner[f][i / 3] >> i % 3 & 1 ? high : low)[i % 3];
             }
-            shape_quad(s, v[0], v[1], v[2], v[3]);
+            shape_quad_at(s, (const double(*)[3])at);
         }
     }
 }

@@ -1,10 +1,129 @@
 /* Meshes that a texture cuts out: rays against them, the cover of a triangle, and the pieces that voxels are
  * made of. */
-#include "masked.h"
 
 #include "geometry/alpha_mask.h"
+#include "shading.h"
+#include "testing.h"
 #include "trace/embree.h"
 #include "truth/metrics.h"
+
+/* A disc of this radius in a square of side 2, as an alpha of this many texels: a ramp that is a half at the
+ * disc's edge, and some texels wide. */
+#define DISC_RADIUS 0.8
+enum { DISC_TEXELS = 128, DISC_SECTORS = 256 };
+
+typedef struct card {
+    float positions[12], uvs[8];
+    uint8_t alpha[DISC_TEXELS * DISC_TEXELS];
+    vsh_alpha_mask mask;
+    vsh_mesh mesh;
+} card;
+
+static vsh_alpha_mask mask_of(const uint8_t *alpha, int32_t width, int32_t height) {
+    return (vsh_alpha_mask){.alpha = alpha,
+                            .width = width,
+                            .height = height,
+                            .uv_transform = {1, 0, 0, 0, 1, 0},
+                            .alpha_cutoff = 0.5,
+                            .base_alpha = 1.0};
+}
+
+/* A card in the plane of this height, seen from above anticlockwise: its front is up. */
+static card *card_at(float height) {
+    card *c = malloc(sizeof *c);
+    for (uint32_t k = 0; k < 4; ++k) {
+        const bool right = k == 1 || k == 2, far = k >= 2;
+        const float at[3] = {right ? 1.0f : -1.0f, height, far ? -1.0f : 1.0f};
+        memcpy(c->positions + 3 * k, at, sizeof at);
+        c->uvs[2 * k] = right ? 1.0f : 0.0f;
+        c->uvs[2 * k + 1] = far ? 1.0f : 0.0f;
+    }
+    for (int y = 0; y < DISC_TEXELS; ++y) {
+        for (int x = 0; x < DISC_TEXELS; ++x) {
+            const double u = 2.0 * (x + 0.5) / DISC_TEXELS - 1.0, v = 2.0 * (y + 0.5) / DISC_TEXELS - 1.0;
+            const double value = 127.5 + 2000.0 * (DISC_RADIUS - hypot(u, v));
+            c->alpha[y * DISC_TEXELS + x] = (uint8_t)(fmin(255.0, fmax(0.0, value)) + 0.5);
+        }
+    }
+    c->mask = mask_of(c->alpha, DISC_TEXELS, DISC_TEXELS);
+    c->mesh = quad_mesh("card", c->positions, NULL);
+    c->mesh.mask = &c->mask;
+    c->mesh.mask_uvs = c->uvs;
+    return c;
+}
+
+/* The disc as triangles. */
+typedef struct fan {
+    float positions[3 * (DISC_SECTORS + 1)];
+    uint32_t indices[3 * DISC_SECTORS];
+    vsh_mesh mesh;
+} fan;
+
+static fan *fan_at(float height) {
+    fan *f = malloc(sizeof *f);
+    /* as large as the circle that the polygon stands for */
+    const double radius = DISC_RADIUS * sqrt(2.0 * PI / DISC_SECTORS / sin(2.0 * PI / DISC_SECTORS));
+    memcpy(f->positions, (const float[]){0.0f, height, 0.0f}, 3 * sizeof(float));
+    for (uint32_t i = 0; i < DISC_SECTORS; ++i) {
+        const double angle = 2.0 * PI * i / DISC_SECTORS;
+        const float at[3] = {(float)(radius * cos(angle)), height, (float)(-radius * sin(angle))};
+        memcpy(f->positions + 3 * (i + 1), at, sizeof at);
+        const uint32_t corners[3] = {0, i + 1, (i + 1) % DISC_SECTORS + 1};
+        memcpy(f->indices + 3 * i, corners, sizeof corners);
+    }
+    f->mesh = mesh_of_arrays("disc", f->positions, NULL, DISC_SECTORS + 1, f->indices, DISC_SECTORS);
+    return f;
+}
+
+/* Lookups as the standards have them. */
+static int wrap(int at, int size, int32_t how) {
+    if (how == VSH_WRAP_CLAMP) {
+        return at < 0 ? 0 : at >= size ? size - 1 : at;
+    }
+    const int period = how == VSH_WRAP_MIRROR ? 2 * size : size;
+    while (at < 0) {
+        at += period;
+    }
+    while (at >= period) {
+        at -= period;
+    }
+    return at < size ? at : period - 1 - at;
+}
+
+/* As the standards have it, with another sum. */
+static double alpha_at(const vsh_alpha_mask *m, double u, double v) {
+    const double *t = m->uv_transform;
+    const double x = (t[0] * u + t[1] * v + t[2]) * m->width - 0.5;
+    const double y = (1.0 - (t[3] * u + t[4] * v + t[5])) * m->height - 0.5;
+    double sum = 0.0;
+    for (int j = 0; j < 2; ++j) {
+        for (int i = 0; i < 2; ++i) {
+            const int column = (int)floor(x) + i, row = (int)floor(y) + j;
+            const int texel =
+                wrap(row, m->height, m->wrap[1]) * m->width + wrap(column, m->width, m->wrap[0]);
+            sum += (1.0 - fabs(x - column)) * (1.0 - fabs(y - row)) * m->alpha[texel] / 255.0;
+        }
+    }
+    return m->base_alpha * sum;
+}
+
+enum { WIDE = 5, HIGH = 7 };
+
+static vsh_alpha_mask random_mask(uint8_t alpha[WIDE * HIGH], int i, uint32_t *seed) {
+    for (int k = 0; k < WIDE * HIGH; ++k) {
+        alpha[k] = (uint8_t)(next_random(seed) * 255.99);
+    }
+    vsh_alpha_mask mask = mask_of(alpha, WIDE, HIGH);
+    mask.wrap[0] = i % 3;
+    mask.wrap[1] = i / 3 % 3;
+    if (i % 2 == 1) {
+        const double turned[6] = {0.8, -1.7, 0.4, 1.1, 0.6, -2.3};
+        memcpy(mask.uv_transform, turned, sizeof turned);
+        mask.base_alpha = 0.7;
+        mask.alpha_cutoff = 0.3;
+    }
+    return mask;
+}
 
 static const float UP[3] = {0.0f, 1.0f, 0.0f};
 
@@ -65,7 +184,7 @@ TEST(rays_see_wraps_transforms_cutoff_and_base_factor) {
         }
         OWNED(vshi_triangles) *triangles = triangles_from(&c->mesh, 1);
         for (int k = 0; k < 400; ++k) {
-            const double x = 1.9 * next_of(&seed) - 0.95, z = 1.9 * next_of(&seed) - 0.95;
+            const double x = 1.9 * next_random(&seed) - 0.95, z = 1.9 * next_random(&seed) - 0.95;
             const double u = 2.5 * (x + 1.0) - 2.25, v = 2.5 * (1.0 - z) - 2.25;
             const double off = alpha_at(&c->mask, u, v) - c->mask.alpha_cutoff;
             if (fabs(off) > 1e-5) {
@@ -92,9 +211,9 @@ TEST(a_ray_sees_the_same_alone_and_in_any_packet) {
     static bool together[RAYS], turned[RAYS];
     uint32_t seed = 3;
     for (size_t i = 0; i < RAYS; ++i) {
-        vshi_vec d = vshi_unit((vshi_vec){0.5 * next_of(&seed), 1.0, 0.5 * next_of(&seed)});
-        rays[i] =
-            (vshi_segment_ray){{next_of(&seed) - 0.8, 0.0, next_of(&seed) - 0.8}, {d.x, d.y, d.z}, INFINITY};
+        vshi_vec d = vshi_unit((vshi_vec){0.5 * next_random(&seed), 1.0, 0.5 * next_random(&seed)});
+        rays[i] = (vshi_segment_ray){
+            {next_random(&seed) - 0.8, 0.0, next_random(&seed) - 0.8}, {d.x, d.y, d.z}, INFINITY};
     }
     vshi_triangles_blocked(triangles, rays, RAYS, together);
     int met = 0;
@@ -212,17 +331,17 @@ TEST(the_cover_of_a_triangle_holds_all_over_it) {
         for (int k = 0; k < 20; ++k) {
             float uvs[3][2];
             vshi_mask_place places[3];
-            const double size = k % 3 == 0 ? 4.0 : 0.3, x = 8.0 * next_of(&seed) - 4.0,
-                         y = 8.0 * next_of(&seed);
+            const double size = k % 3 == 0 ? 4.0 : 0.3, x = 8.0 * next_random(&seed) - 4.0,
+                         y = 8.0 * next_random(&seed);
             for (int v = 0; v < 3; ++v) {
-                uvs[v][0] = (float)(x + size * next_of(&seed));
-                uvs[v][1] = (float)(y + size * next_of(&seed));
+                uvs[v][0] = (float)(x + size * next_random(&seed));
+                uvs[v][1] = (float)(y + size * next_random(&seed));
                 places[v] = vshi_alpha_mask_place(&mask, uvs[v]);
             }
             const vshi_mask_cover cover = vshi_mask_table_cover(&table, places);
             ++counts[cover];
             for (int s = 0; s < 40 && cover != VSHI_MASK_MIXED; ++s) {
-                double a = next_of(&seed), b = next_of(&seed);
+                double a = next_random(&seed), b = next_random(&seed);
                 a = a + b > 1.0 ? 1.0 - a : a;
                 b = a + b > 1.0 ? 1.0 - b : b;
                 const double p = 1.0 - a - b;

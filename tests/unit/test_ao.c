@@ -20,9 +20,7 @@ static vsh_shade_options options_of(int32_t method, int32_t rays, double distanc
 static vsh_shade_stats shade(const vsh_occluders *casters, const vsh_shade_options *options, size_t count,
                              const double *positions, const float *normals, float *ao, float *deviation) {
     const vsh_points points = {count, positions, normals, NULL};
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    assert_ok(vsh_shade_ao(casters, &points, options, NULL, ao, deviation, NULL, &stats, &failure));
-    return stats;
+    return shade_ao_points(casters, &points, options, NULL, ao, deviation);
 }
 
 /* By so many cones; 0: by taps. */
@@ -75,9 +73,8 @@ TEST(an_open_plate_is_exactly_1) {
     float normals[3 * COUNT], ao[COUNT];
     uint64_t counter = 1;
     for (int i = 0; i < COUNT; ++i) {
-        const double p[3] = {between(&counter, -4.0, 4.0), i % 2 ? 0.0 : 1e-3, between(&counter, -4.0, 4.0)};
-        memcpy(positions + 3 * i, p, sizeof p);
-        memcpy(normals + 3 * i, UP, sizeof UP);
+        const double x = between(&counter, -4.0, 4.0), z = between(&counter, -4.0, 4.0);
+        put_point(positions, normals, (size_t)i, x, i % 2 ? 0.0 : 1e-3, z);
     }
     for (double distance = 0.1; distance < 30.0; distance *= 3.0) {
         for (int32_t method = 0; method < AO_METHODS; ++method) {

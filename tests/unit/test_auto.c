@@ -9,22 +9,9 @@ static void add_box(shape *s, double x0, double y0, double z0, double x1, double
     shape_box(s, (double[3]){x0, y0, z0}, (double[3]){x1, y1, z1}, ALL_SIDES);
 }
 
-static void add_quad(shape *s, const double corners[4][3]) {
-    uint32_t v[4];
-    for (int k = 0; k < 4; ++k) {
-        v[k] = shape_vertex(s, corners[k][0], corners[k][1], corners[k][2]);
-    }
-    shape_quad(s, v[0], v[1], v[2], v[3]);
-}
-
-static casting make_of(const vsh_mesh *meshes, size_t count, double voxel) {
-    return (casting){field_of_grid(grid_from_meshes(meshes, count, voxel), 4.0),
-                     triangles_from(meshes, count)};
-}
-
 static casting make(const shape *s, double voxel) {
     const vsh_mesh mesh = shape_mesh(s, "shape");
-    return make_of(&mesh, 1, voxel);
+    return caster_of_meshes(&mesh, 1, voxel, 4.0);
 }
 
 static double positions[3 * COUNT];
@@ -33,12 +20,8 @@ static uint32_t texels[COUNT];
 
 /* A square of points that look up, `height` over the origin. */
 static vsh_points board(double half, double height) {
+    put_square(SIDE, half, height, positions, normals);
     for (size_t i = 0; i < COUNT; ++i) {
-        positions[3 * i] = half * (2.0 * ((double)(i % SIDE) + 0.5) / SIDE - 1.0);
-        positions[3 * i + 1] = height;
-        positions[3 * i + 2] = half * (2.0 * ((double)(i / SIDE) + 0.5) / SIDE - 1.0);
-        normals[3 * i] = normals[3 * i + 2] = 0.0f;
-        normals[3 * i + 1] = 1.0f;
         texels[i] = (uint32_t)(i % SIDE + 65536 * (i / SIDE));
     }
     return (vsh_points){COUNT, positions, normals, texels};
@@ -49,9 +32,7 @@ static const double UP[3] = {0.4, 1.0, 0.3};
 static vsh_shade_stats shade(const vsh_occluders *casters, const vsh_points *points,
                              const vsh_shade_options *options, float *into) {
     const vsh_light light = sun(UP, RADIANS(6.0));
-    vsh_shade_stats stats = vsh_shade_stats_zero();
-    assert_ok(vsh_shade_shadow(casters, points, &light, options, NULL, into, NULL, &stats, &failure));
-    return stats;
+    return shade_points(casters, points, &light, options, NULL, into, NULL);
 }
 
 static double rmse_to_truth(const casting *c, const vsh_points *points) {
@@ -90,7 +71,7 @@ TEST(parts_thinner_than_voxels_are_reported_as_lost) {
     const vsh_mesh meshes[2] = {shape_mesh(fence, "fence"), shape_mesh(block, "block")};
     const double voxels[3] = {0.12, 0.05, 0.012};
     for (int v = 0; v < 3; ++v) {
-        FREED_BY(caster_free) casting c = make_of(meshes, 2, voxels[v]);
+        FREED_BY(caster_free) casting c = caster_of_meshes(meshes, 2, voxels[v], 4.0);
         vshi_lost lost[2];
         assert_ok(vshi_field_find_lost(c.field, meshes, 2, c.triangles, lost, &failure));
         assert_less(lost[1].share, 0.005);
@@ -116,7 +97,7 @@ TEST(voxels_coarser_than_casters_add_no_error_to_exact) {
                                    {x + 0.1, y + t, z - 0.1},
                                    {x + 0.1, y + t, z + 0.1},
                                    {x - 0.1, y, z + 0.1}};
-        add_quad(cards, card);
+        shape_quad_at(cards, card);
     }
     const vsh_points points = board(1.0, 0.0);
     const shape *const shapes[2] = {slats, cards};

@@ -242,7 +242,7 @@ static void irradiance_and_tint(const context *c, int32_t unused, bits *b) {
 static void lightmap(const context *c, int32_t method, bits *b) {
     static const float corners[12] = {-2, 0, 2, 2, 0, 2, 2, 0, -2, -2, 0, -2};
     static const float uvs[8] = {0.125f, 0.125f, 0.875f, 0.125f, 0.875f, 0.875f, 0.125f, 0.875f};
-    const vsh_mesh floor = quad_of_arrays(NULL, corners, uvs);
+    const vsh_mesh floor = quad_mesh(NULL, corners, uvs);
     enum { SIZE = 64, TEXELS = SIZE * SIZE };
     static float shadow_plane[TEXELS], ao_plane[TEXELS], rgb[3 * TEXELS], coverage[TEXELS];
     vsh_lightmap_options options = preview_lightmap_options();
@@ -277,8 +277,7 @@ static void seams(const context *c, int32_t unused, bits *b) {
     options.width = options.height = STITCHED;
     uint32_t random = 1;
     for (size_t i = 0; i < 3 * STITCHED_TEXELS; ++i) {
-        random = random * 1664525u + 1013904223u;
-        light[i] = (float)(random >> 8) * 0x1p-24f;
+        light[i] = (float)next_random(&random);
         open[i / 3] = light[i];
     }
     const vsh_lightmap map = {.ao = open, .irradiance = light};
@@ -614,17 +613,15 @@ TEST(denormals_are_numbers) {
     const double towards[3] = {5e-324, 1e-310, 0.0};
     const vsh_light light = sun(towards, 1e-310), straight = sun((const double[]){0.0, 1.0, 0.0}, 0.0);
     for (size_t s = 0; s < COUNT_OF(SETTINGS); ++s) {
-        for (int32_t method = 0; method < SHADOW_METHODS + AO_METHODS; ++method) {
-            const int32_t ao_method = method - SHADOW_METHODS;
+        for (int kind = 0; kind < KINDS; ++kind) {
             vshi_floats_set(SETTINGS[s]);
-            const float a = ao_method < 0 ? cast_shadow_at(&c, &light, method, p, tiny)
-                                          : cast_ao_at(&c, ao_method, 1.0, p, tiny);
-            const float b = ao_method < 0 ? cast_shadow_at(&c, &straight, method, zero, up)
-                                          : cast_ao_at(&c, ao_method, 1.0, zero, up);
+            const float a = cast_kind_at(&c, kind, &light, 1.0, p, tiny),
+                        b = cast_kind_at(&c, kind, &straight, 1.0, zero, up);
             vshi_floats_set(VSHI_FLOATS_DEFAULT);
             /* the normal is turned by a thousandth */
-            assert_true(ao_method < 0 ? bits_of(a) == bits_of(b) : fabsf(a - b) <= 1e-2f);
-            assert_true(ao_method < 0 || bits_of(b) == bits_of(cast_ao_at(&c, ao_method, 1.0, zero, up)));
+            assert_true(is_ao(kind) ? fabsf(a - b) <= 1e-2f : bits_of(a) == bits_of(b));
+            assert_true(!is_ao(kind) ||
+                        bits_of(b) == bits_of(cast_kind_at(&c, kind, &straight, 1.0, zero, up)));
         }
     }
 }

@@ -33,7 +33,7 @@ static vsh_mesh place(charts *c, uint64_t seed, double longest) {
             *(k >= 2 ? &c->high[i][1] : &c->low[i][1]) = (1.0 - (double)uv[1]) * HEIGHT;
         }
         for (int k = 0; k < 6; ++k) {
-            c->indices[6 * i + k] = (uint32_t)(4 * i) + QUAD_ORDER[k];
+            c->indices[6 * i + k] = (uint32_t)(4 * i) + QUAD_INDICES[k];
         }
     }
     return mesh_of_arrays(NULL, c->positions, c->uvs, 4 * (size_t)c->count, c->indices, 2 * (size_t)c->count);

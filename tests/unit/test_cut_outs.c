@@ -33,15 +33,11 @@ static bytes disc_image(float outside) {
     vsh_image_options options = vsh_image_options_default();
     options.bits = 8;
     options.pack = "R=R,G=G,B=B,A=A";
-    const file_path path = path_of("disc.png");
-    assert_ok(vsh_image_write(path.text, &image, &options, &failure));
+    const char *path = at("disc.png");
+    assert_ok(vsh_image_write(path, &image, &options, &failure));
     bytes b;
-    FILE *file = fopen(path.text, "rb");
-    assert_non_null(file);
-    b.at = malloc(1 << 20);
-    b.size = fread(b.at, 1, 1 << 20, file);
-    fclose(file);
-    assert_int_equal(unlink(path.text), 0);
+    b.size = read_all(path, &b.at);
+    assert_int_equal(unlink(path), 0);
     return b;
 }
 
@@ -56,7 +52,7 @@ static char *data_uri(bytes b) {
 static void write_card(const char *materials, const char *sampler, const char *image_uri, float scale) {
     static float positions[3 * CORNERS], uvs[2 * CORNERS];
     static uint16_t indices[3 * TRIANGLES];
-    size_t at = 0;
+    size_t next = 0;
     for (size_t i = 0; i < CORNERS; ++i) {
         const float x = (float)(i % (CELLS + 1)) / CELLS, z = (float)(i / (CELLS + 1)) / CELLS;
         const float place[3] = {2.0f * x - 1.0f, 1.0f, 2.0f * z - 1.0f};
@@ -68,8 +64,8 @@ static void write_card(const char *materials, const char *sampler, const char *i
         const uint16_t a = (uint16_t)(cell / CELLS * (CELLS + 1) + cell % CELLS);
         const uint16_t b = (uint16_t)(a + CELLS + 1);
         const uint16_t corners[6] = {a, b, (uint16_t)(b + 1), a, (uint16_t)(b + 1), (uint16_t)(a + 1)};
-        memcpy(indices + at, corners, sizeof corners);
-        at += 6;
+        memcpy(indices + next, corners, sizeof corners);
+        next += 6;
     }
     FREED maker *m = calloc(1, sizeof *m);
     add(m, positions, sizeof positions, "", FLOATS, CORNERS, "VEC3", "");
@@ -85,7 +81,7 @@ static void write_card(const char *materials, const char *sampler, const char *i
                                                        "\"samplers\":[%s],\"images\":[{\"uri\":\"%s\"}]",
              materials, sampler, image_uri);
     const char *json = text_of(m, rest);
-    write_bytes("a.gltf", json, strlen(json));
+    write_all(at("a.gltf"), json, strlen(json));
 }
 
 #define MASKED(more)                                                                                         \
@@ -108,9 +104,9 @@ static vsh_result load(card c, vsh_assets **assets) {
     char *own = data_uri(png);
     write_card(c.material != NULL ? c.material : MASKED(""), c.sampler != NULL ? c.sampler : "{}",
                c.uri != NULL ? c.uri : own, c.scale > 0.0f ? c.scale : 1.0f);
-    const file_path path = path_of("a.gltf");
+    const char *path = at("a.gltf");
     vsh_caster caster = {
-        .type = VSH_CASTER_MESH, .path = path.text, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
+        .type = VSH_CASTER_MESH, .path = path, .transform = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0}};
     vsh_scene scene = vsh_scene_default();
     scene.casters = &caster;
     scene.caster_count = 1;
@@ -123,7 +119,7 @@ static vsh_result load(card c, vsh_assets **assets) {
     run.reader_seconds = c.reader ? 120.0 : 0.0;
     warnings[0] = '\0';
     const vsh_result result = vsh_assets_load(&scene, &run, assets, &failure);
-    assert_int_equal(unlink(path.text), 0);
+    assert_int_equal(unlink(path), 0);
     free(own);
     free(png.at);
     return result;
@@ -167,12 +163,12 @@ static void assert_casts(card c, int (*expected)(double x, double z)) {
 
 TEST(a_card_casts_the_disc_in_its_textures_alpha) {
     const bytes png = disc_image(0.0f);
-    write_bytes("leaf.png", png.at, png.size);
+    write_all(at("leaf.png"), png.at, png.size);
     for (int i = 0; i < 4; ++i) {
         assert_casts((card){.reader = (i & 1) != 0, .uri = (i & 2) != 0 ? "leaf.png" : NULL}, by_disc);
         assert_string_equal(warnings, "");
     }
-    assert_int_equal(unlink(path_of("leaf.png").text), 0);
+    assert_int_equal(unlink(at("leaf.png")), 0);
     free(png.at);
 }
 
@@ -292,4 +288,4 @@ TEST(a_texture_past_the_memory_limit_is_an_error) {
     assert_null(assets);
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

@@ -250,15 +250,8 @@ TEST(a_turned_box_far_away_is_within_what_a_trilinear_sample_errs) {
         for (int axis = 0; axis < 3; ++axis) {
             local[axis] = between(&counter, -1.5, 1.5);
         }
-        /* Rodrigues' rotation about the unit axis a by 50° */
-        const double a[3] = {1.0 / norm, 2.0 / norm, 3.0 / norm};
-        const double c = cos(2.0 * half), s = sin(2.0 * half);
-        const double along = a[0] * local[0] + a[1] * local[1] + a[2] * local[2];
-        for (int axis = 0; axis < 3; ++axis) {
-            const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-            p[axis] = c * local[axis] + s * (a[j] * local[k] - a[k] * local[j]) +
-                      (1.0 - c) * along * a[axis] + node.translation[axis];
-        }
+        turn_about((const double[3]){1.0, 2.0, 3.0}, 2.0 * half, local, p);
+        go_along(p, 1.0, node.translation, p);
         const double h = resolved_distance(field, p);
         const double truth = truth_solid_distance(&box, local);
         const double error = (h - truth) / resolving_voxel(field, h);

@@ -39,7 +39,7 @@ static void compare_with_rays(const vsh_outline *outline, const vsh_light *light
 }
 
 TEST(text_is_as_rays_see_it) {
-    OWNED(vsh_outline) *letters = text("vdb", 1.0);
+    OWNED(vsh_outline) *letters = lines_of("vdb", VSH_ALIGN_CENTER);
     const vsh_light lights[] = {lamp(0.3, 2.0, 0.3),  lamp(-0.5, 0.2, 0.5),    lamp(-0.5, -0.3, 0.05),
                                 lamp(5.0, -3.0, 1.0), flat_sun(1.0, 0.3, 0.2), flat_sun(-0.2, -1.0, 2.5)};
     for (size_t l = 0; l < COUNT_OF(lights); ++l) {
@@ -90,8 +90,7 @@ TEST(a_comb_of_a_thousand_teeth) {
         memcpy(points + 8 * i, tooth, sizeof tooth);
         counts[i] = 4;
     }
-    OWNED(vsh_outline) *comb = NULL;
-    assert_ok(vsh_outline_from_polygons(points, counts, TEETH, NULL, &comb, &failure));
+    OWNED(vsh_outline) *comb = polygons(points, counts, TEETH);
     for (int k = 0; k < 5; ++k) {
         const double x = 0.3 * k, half = 1.3;
         const vsh_light sky = flat_sun(0.0, 1.0, 2.0 * half);
@@ -110,7 +109,7 @@ TEST(a_comb_of_a_thousand_teeth) {
 }
 
 TEST(a_light_of_no_size_is_seen_or_not) {
-    OWNED(vsh_outline) *letters = text("vdb", 1.0);
+    OWNED(vsh_outline) *letters = lines_of("vdb", VSH_ALIGN_CENTER);
     const vsh_light lights[] = {lamp(0.3, 2.0, 0.0), flat_sun(1.0, 0.3, 0.0)};
     int dark = 0, lit = 0;
     for (size_t l = 0; l < 2; ++l) {
@@ -166,7 +165,7 @@ static void texel_point(size_t i, double p[2]) {
 
 TEST(a_map_holds_the_light_that_its_texels_see) {
     static map m;
-    OWNED(vsh_outline) *letters = text("flat", 1.0);
+    OWNED(vsh_outline) *letters = lines_of("flat", VSH_ALIGN_CENTER);
     vsh_light lights[2] = {lamp(0.3, 1.5, 0.2), flat_sun(1.0, 0.5, 0.3)};
     lights[0].falloff = VSH_FALLOFF_QUADRATIC;
     lights[0].reach = 2.5;
@@ -229,7 +228,7 @@ TEST(classic_knows_the_outer_half_of_a_penumbra) {
 
 TEST(a_scene_of_twice_the_size_is_the_same) {
     static map a, b;
-    OWNED(vsh_outline) *letters = text("flat", 1.0), *larger = NULL;
+    OWNED(vsh_outline) *letters = lines_of("flat", VSH_ALIGN_CENTER), *larger = NULL;
     const double twice[6] = {2.0, 0.0, 0.0, 0.0, 2.0, 0.0};
     const vshi_outline_instance instance = {letters, twice};
     assert_ok(vshi_outline_unite(&instance, 1, NULL, &larger, &failure));
@@ -333,7 +332,7 @@ TEST(bad_options_and_small_limits_are_refused) {
 
 TEST(tiny_lights_are_seen_or_not_and_wide_ones_as_their_neighbours) {
     static const double SIZES[] = {5e-324, 1e-300, 1e-160, 1e-50, 1e-20, 1e-10, 1e-7};
-    OWNED(vsh_outline) *letters = text("vdb", 1.0);
+    OWNED(vsh_outline) *letters = lines_of("vdb", VSH_ALIGN_CENTER);
     for (uint64_t i = 0; i < 300; ++i) {
         const double p[2] = {4.0 * any(2 * i) - 2.0, 4.0 * any(2 * i + 1) - 2.0};
         vsh_light lights[] = {lamp(1.9, 1.7, 0.0), flat_sun(0.3, 1.0, 0.0)};

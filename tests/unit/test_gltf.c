@@ -407,11 +407,11 @@ TEST(a_missing_buffer_is_named) {
     refused("a.gltf", BESIDE("my%20data.bin"), VSH_ERROR_READ, "my data.bin': cannot be read: No such file",
             "buffers[0]");
     refused("a.gltf", BESIDE("https://example.org/a.bin"), VSH_ERROR_UNSUPPORTED, "https://", "beside it");
-    write_bytes("my data.bin", QUAD, 48);
+    write_all(at("my data.bin"), QUAD, 48);
     vsh_model_free(read_text("a.gltf", BESIDE("my%20data.bin")));
-    write_bytes("my data.bin", QUAD, 40);
+    write_all(at("my data.bin"), QUAD, 40);
     refused("a.gltf", BESIDE("my%20data.bin"), VSH_ERROR_READ, "cut short: 40 bytes of 48", "buffers[0]");
-    assert_int_equal(unlink(path_of("my data.bin").text), 0);
+    assert_int_equal(unlink(at("my data.bin")), 0);
 #undef BESIDE
 }
 
@@ -453,11 +453,11 @@ TEST(claims_of_memory_are_checked) {
     FREED maker *m = begin();
     strcat(m->accessors, ",{\"componentType\":5126,\"count\":4000000000,\"type\":\"VEC3\"}");
     const char *text = text_of(m, ALONE MESH("\"POSITION\":2", ""));
-    write_bytes("a.gltf", text, strlen(text));
+    write_all(at("a.gltf"), text, strlen(text));
     const vsh_run run = run_within(100000000);
     vsh_model *model;
-    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+    assert_int_equal(vsh_model_read(at("a.gltf"), &run, &model, &failure), VSH_ERROR_LIMIT);
+    assert_int_equal(unlink(at("a.gltf")), 0);
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

@@ -4,7 +4,91 @@
 
 #include "gltf_maker.h"
 #include "handles.h"
-#include "served.h"
+#include "io/model/model.h"
+#include "models.h"
+#include "testing.h"
+#include <sys/mman.h>
+
+/* A glTF, read here or by a reader; its warnings are kept. */
+static vsh_model *read_gltf_by(bool reader, const char *json) {
+    vsh_run run = vsh_run_default();
+    run.warning = keep_warning;
+    run.notes = 1;
+    run.reader = reader ? "/proc/self/exe" : NULL;
+    run.reader_seconds = reader ? 120.0 : 0.0;
+    warnings[0] = '\0';
+    vsh_model *model = NULL;
+    write_all(at("a.gltf"), json, strlen(json));
+    assert_ok(vsh_model_read(at("a.gltf"), &run, &model, &failure));
+    assert_int_equal(unlink(at("a.gltf")), 0);
+    return model;
+}
+
+/* Writes a reader's answer for a file. Returns its number of bytes. */
+static size_t payload_of(const char *name, unsigned char *bytes, size_t room) {
+    static vshi_encoder encoder;
+    vsh_error error = {0};
+    const vsh_run run = vsh_run_default();
+    const int file = memfd_create("payload", 0);
+    vshi_encoder_begin(&encoder, file, 0);
+    assert_int_equal(vshi_serve_model(at(name), NULL, &run, &encoder, &error), VSH_OK);
+    assert_true(vshi_encoder_flush(&encoder));
+    assert_in_range(encoder.size, 8, room);
+    assert_int_equal(pread(file, bytes, (size_t)encoder.size, 0), (ssize_t)encoder.size);
+    close(file);
+    return (size_t)encoder.size;
+}
+
+/* The model of a telling, within a memory limit. */
+static vsh_result decode(const unsigned char *bytes, size_t size, const char *name, uint64_t limit,
+                         vsh_model **model, vsh_error *error) {
+    vshi_decoder decoder = {bytes, bytes + size, false};
+    vsh_run run = run_within(limit);
+    return vshi_model_decode(&decoder, at(name), &run, model, error);
+}
+
+/* Small counts and numbers of arrays, doubles that are none or out of range, and two letters of a path. */
+enum { WRONG_WORDS = 13 };
+static const uint64_t wrong_words[WRONG_WORDS] = {0,
+                                                  1,
+                                                  2,
+                                                  3,
+                                                  9,
+                                                  64,
+                                                  UINT64_MAX,
+                                                  UINT64_C(0x7ff) << 52,
+                                                  UINT64_C(0xbff) << 52,
+                                                  UINT64_C(0x3ff) << 52,
+                                                  UINT64_C(0x7ff8) << 48,
+                                                  UINT64_C(0x7fe) << 52,
+                                                  UINT64_C(0x6374652f2e2e2f2e)};
+
+/* Each word of a file's telling in turn wrong, or perhaps: refused in a line that names the file, or a model
+ * for `look`. So many refused and sound ones are expected at least. */
+static void tell_wrong(const char *name, const uint64_t *values, size_t value_count,
+                       void (*look)(const vsh_model *), int refused_least, int sound_least) {
+    static _Alignas(8) unsigned char whole[4096], bytes[4096];
+    const size_t size = payload_of(name, whole, sizeof whole);
+    int refused_count = 0, sound_count = 0;
+    for (size_t word = 0; word < size / 8; ++word) {
+        for (size_t k = 0; k < value_count; ++k) {
+            vsh_model *model = NULL;
+            vsh_error error = {0};
+            memcpy(bytes, whole, size);
+            memcpy(bytes + 8 * word, &values[k], 8);
+            if (decode(bytes, size, name, 0, &model, &error) != VSH_OK) {
+                assert_that(strstr(error.message, name) != NULL, "word %zu: %s", word, error.message);
+                ++refused_count;
+                continue;
+            }
+            look(model);
+            vsh_model_free(model);
+            ++sound_count;
+        }
+    }
+    assert_in_range(refused_count, refused_least, 100000);
+    assert_in_range(sound_count, sound_least, 100000);
+}
 
 /* Five bytes are the image, in buffer view 2. */
 static const unsigned char image[5] = {'I', 'M', 'A', 'G', 'E'};
@@ -172,7 +256,7 @@ TEST(images_may_lie_beside_or_in_the_json) {
                                     "\"images\":[{\"uri\":\"my%20leaf.webp\"}]"));
         vshi_material leaf = vshi_model_get_material(model, 1);
         assert_null(leaf.image);
-        assert_string_equal(leaf.image_path, path_of("my leaf.webp").text);
+        assert_string_equal(leaf.image_path, at("my leaf.webp"));
         assert_true(leaf.wrap[0] == VSH_WRAP_REPEAT && leaf.wrap[1] == VSH_WRAP_REPEAT);
         OWNED(vsh_model) *within = read_gltf_by(
             reader != 0, material_json(LEAF(""), "\"textures\":[{\"source\":0}],\"images\":[{\"uri\":"
@@ -227,13 +311,13 @@ static void write_two_images(void) {
     const char *json =
         material_json(LEAF(""), "\"textures\":[{\"source\":0},{\"source\":1}],\"images\":[{\"uri\":"
                                 "\"x.png\"},{\"bufferView\":2}]");
-    write_bytes("a.gltf", json, strlen(json));
+    write_all(at("a.gltf"), json, strlen(json));
 }
 
 TEST(damaged_materials_from_a_reader_are_refused_or_in_range) {
     write_two_images();
     tell_wrong("a.gltf", wrong_words, WRONG_WORDS, look_at_materials, 100, 20);
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+    assert_int_equal(unlink(at("a.gltf")), 0);
 }
 
 TEST(a_path_from_a_reader_that_leaves_the_folder_is_refused) {
@@ -241,15 +325,15 @@ TEST(a_path_from_a_reader_that_leaves_the_folder_is_refused) {
     write_two_images();
     const size_t size = payload_of("a.gltf", bytes, sizeof bytes);
     const char name[] = "x.png";
-    unsigned char *at = memmem(bytes, size, name, sizeof name);
-    assert_non_null(at);
+    unsigned char *place = memmem(bytes, size, name, sizeof name);
+    assert_non_null(place);
     const char out[] = "/etc/passwd";
-    unsigned char *begin = at - strlen(folder) - 1; /* where the path begins: its length stays */
-    memset(begin, '/', (size_t)(at - begin) + sizeof name - 1);
-    memcpy(at + sizeof name - sizeof out, out, sizeof out - 1);
+    unsigned char *begin = place - strlen(folder) - 1; /* where the path begins: its length stays */
+    memset(begin, '/', (size_t)(place - begin) + sizeof name - 1);
+    memcpy(place + sizeof name - sizeof out, out, sizeof out - 1);
     vsh_model *model = NULL;
     assert_fails(decode(bytes, size, "a.gltf", 0, &model, &failure), VSH_ERROR_READ, "its images");
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+    assert_int_equal(unlink(at("a.gltf")), 0);
 }
 
 /* --- KHR_lights_punctual */
@@ -399,9 +483,9 @@ static void look_at_lights(const vsh_model *model) {
 
 TEST(damaged_lights_from_a_reader_are_refused_or_in_range) {
     const char *json = lit_json(nodes, lights);
-    write_bytes("a.gltf", json, strlen(json));
+    write_all(at("a.gltf"), json, strlen(json));
     tell_wrong("a.gltf", wrong_words, WRONG_WORDS, look_at_lights, 200, 20);
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+    assert_int_equal(unlink(at("a.gltf")), 0);
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

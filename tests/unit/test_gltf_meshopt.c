@@ -301,11 +301,11 @@ TEST(the_memory_limit_holds_for_unpacked_data) {
     memset(positions, 0, sizeof positions); /* packed 60 times as small */
     pack_sheet(true, 2);
     const char *json = packed_json();
-    write_bytes("a.gltf", json, strlen(json));
+    write_all(at("a.gltf"), json, strlen(json));
     vsh_run run = run_within(6 * strlen(json) + 1000);
     vsh_model *model;
-    assert_int_equal(vsh_model_read(path_of("a.gltf").text, &run, &model, &failure), VSH_ERROR_LIMIT);
-    assert_int_equal(unlink(path_of("a.gltf").text), 0);
+    assert_int_equal(vsh_model_read(at("a.gltf"), &run, &model, &failure), VSH_ERROR_LIMIT);
+    assert_int_equal(unlink(at("a.gltf")), 0);
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

@@ -194,11 +194,6 @@ TEST(a_terrain_is_solid_or_open_as_its_triangles_are) {
     }
 }
 
-static double random_part(uint32_t *state) {
-    *state = *state * 1664525u + 1013904223u;
-    return (double)(*state >> 8) / 16777216.0;
-}
-
 /* From anywhere to anywhere, some upright, some along the grid. */
 static vshi_segment_ray random_ray(const vshi_triangles *of, int number, uint32_t *seed) {
     double low[3], high[3], square = 0.0;
@@ -206,14 +201,14 @@ static vshi_segment_ray random_ray(const vshi_triangles *of, int number, uint32_
     vshi_segment_ray ray = {.far = number % 3 == 0 ? INFINITY : 0.0};
     for (int k = 0; k < 3; ++k) {
         const double side = high[k] - low[k];
-        ray.origin[k] = low[k] + (1.4 * random_part(seed) - 0.2) * side;
-        ray.direction[k] = number % 8 == 0 && k != number / 8 % 3 ? 0.0 : random_part(seed) - 0.5;
+        ray.origin[k] = low[k] + (1.4 * next_random(seed) - 0.2) * side;
+        ray.direction[k] = number % 8 == 0 && k != number / 8 % 3 ? 0.0 : next_random(seed) - 0.5;
         square += ray.direction[k] * ray.direction[k];
     }
     for (int k = 0; k < 3; ++k) {
         ray.direction[k] /= sqrt(square);
     }
-    ray.far = ray.far > 0.0 ? ray.far : 4.0 * random_part(seed);
+    ray.far = ray.far > 0.0 ? ray.far : 4.0 * next_random(seed);
     return ray;
 }
 
@@ -288,8 +283,8 @@ TEST(every_instruction_set_finds_the_same_crossings) {
         for (int lane = 0; lane < VSHI_TERRAIN_LANES; ++lane) {
             float origin[3], direction[3];
             for (int k = 0; k < 3; ++k) {
-                origin[k] = (float)(k == 1 ? 3.0 * random_part(&seed) : 12.0 * random_part(&seed) - 6.0);
-                direction[k] = (float)(random_part(&seed) - 0.5);
+                origin[k] = (float)(k == 1 ? 3.0 * next_random(&seed) : 12.0 * next_random(&seed) - 6.0);
+                direction[k] = (float)(next_random(&seed) - 0.5);
             }
             vshi_terrain_aim(&relief, origin, direction, 0.0, lane % 3 == 0 ? 5.0 : INFINITY, lane, &rays);
         }
@@ -625,12 +620,6 @@ TEST(points_that_are_no_points_are_nan_and_buried_ones_dark) {
 
 /* --- terrains and spheres as layers of a field, and from scene files to lightmaps */
 
-static vsh_field *empty_field(void) {
-    vsh_field *field = NULL;
-    assert_ok(vshi_field_create_empty(1e-5, &field, &failure));
-    return field;
-}
-
 enum { MANY = 1000 };
 
 TEST(a_layer_of_heights_is_marched_by_hard_and_classic_alone) {
@@ -640,7 +629,7 @@ TEST(a_layer_of_heights_is_marched_by_hard_and_classic_alone) {
     const vsh_heights_source source = source_of(samples, SIDE, SIDE, 10.0, 1.5);
     OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
     OWNED(vshi_heights) *heights = heights_of(&source);
-    OWNED(vsh_field) *empty = empty_field();
+    OWNED(vsh_field) *empty = field_of_nothing(1e-5);
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     uint64_t counter = 2;
     for (size_t i = 0; i < MANY; ++i) {
@@ -701,7 +690,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
     const vsh_light light = sun(high, 0.1);
     float *const planes[1] = {shadow};
     vsh_lightmap lightmap = {.shadow = planes, .coverage = coverage};
-    OWNED(vsh_field) *empty = empty_field();
+    OWNED(vsh_field) *empty = field_of_nothing(1e-5);
     assert_ok(vsh_bake_lightmap(occluders_with(empty, &layer, 1), texels, &light, 1, &shade, NULL, &lightmap,
                                 NULL, &failure));
 }

@@ -148,8 +148,6 @@ TEST(points_without_a_place_or_a_normal_add_nothing) {
 enum { SIZE = 32, TEXELS = SIZE * SIZE };
 
 /* The floor y = 0 over [-1, 1]² faces up; u runs along x, v along -z. */
-static const float CORNERS[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1};
-static const float UVS[8] = {0, 0, 1, 0, 1, 1, 0, 1};
 static const float MIRRORED[8] = {1, 0, 0, 0, 0, 1, 1, 1};
 
 static const truth_solid SLAB = {.shape = TRUTH_BOX, .center = {0.0, -0.25, 0.0}, .half = {2.0, 0.25, 2.0}};
@@ -175,7 +173,7 @@ typedef struct asked {
 } asked;
 
 static vsh_result bake(const vsh_field *field, const asked *ask, baked *into) {
-    const vsh_mesh mesh = quad_of_arrays("floor", CORNERS, ask->uvs != NULL ? ask->uvs : UVS);
+    const vsh_mesh mesh = floor_mesh(ask->uvs);
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.tangents = ask->tangents;
@@ -262,7 +260,7 @@ TEST(at_the_foot_of_a_wall_the_normal_is_the_mean_of_the_open_half) {
 TEST(world_and_tangent_space_have_the_same_directions) {
     OWNED(vsh_field) *field = floor_field(true);
     FREED baked *world = malloc(sizeof *world), *tangent = malloc(sizeof *tangent);
-    const float *const uvs[2] = {UVS, MIRRORED};
+    const float *const uvs[2] = {NULL, MIRRORED};
     for (int mirror = 0; mirror < 2; ++mirror) {
         asked ask = {.uvs = uvs[mirror], .ao_method = VSH_AO_CONES, .bent = true};
         assert_ok(bake(field, &ask, world));
@@ -434,7 +432,7 @@ TEST(a_light_shades_the_points_within_its_reach_and_cone_alone) {
 
 /* Of four tiles the light reaches a part of one. */
 TEST(texels_beyond_the_reach_cost_no_ray_and_do_not_dilute_the_error) {
-    const vsh_mesh mesh = quad_of_arrays("floor", CORNERS, UVS);
+    const vsh_mesh mesh = floor_mesh(NULL);
     OWNED(vshi_triangles) *triangles = triangles_from(&mesh, 1);
     OWNED(vsh_occluders) *occluders = occluders_from_triangles(triangles);
     vsh_lightmap_options options = vsh_lightmap_options_default();

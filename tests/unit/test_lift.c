@@ -3,6 +3,7 @@
 #include "casts.h"
 #include "lightmap/origins.h"
 #include "lightmap/texels.h"
+#include "shading.h"
 #include "testing.h"
 #include "texels_of.h"
 
@@ -39,7 +40,7 @@ static void open_scene(scene *s, const box *other) {
     OWNED(vsh_grid) *grid = NULL;
     assert_ok(vsh_grid_from_meshes(casters, count, &grid_options, NULL, &grid, &failure));
     assert_ok(vshi_field_create(grid, NULL, NULL, &s->field, &failure));
-    assert_ok(vshi_triangles_create(casters, count, NULL, &s->triangles, &failure));
+    s->triangles = triangles_from(casters, count);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = WIDTH;
     options.height = HEIGHT;
@@ -50,9 +51,9 @@ static void open_scene(scene *s, const box *other) {
     options.shade.rays = 64;
     vsh_mesh faceted = s->ball.mesh;
     faceted.normals = NULL;
-    s->charts = create(&s->ball.mesh, 1, options, NULL);
+    s->charts = charts_from(&s->ball.mesh, 1, &options);
     s->texels = texels_from(s->charts);
-    OWNED(vsh_charts) *facets = create(&faceted, 1, options, NULL);
+    OWNED(vsh_charts) *facets = charts_from(&faceted, 1, &options);
     s->facets = texels_from(facets);
     s->lifted = samples_of(s->texels);
     s->flat = samples_of(s->facets);
@@ -256,8 +257,7 @@ TEST(queries_take_the_normals_of_faces_for_ao) {
     vsh_shade_options options = vsh_shade_options_default();
     options.ao_method = VSH_AO_EXACT;
     options.ao_distance = 0.1;
-    OWNED(vsh_query) *query = NULL;
-    assert_ok(vsh_query_create(occluders_traced(s.field, s.triangles), NULL, 0, &options, &query, &failure));
+    OWNED(vsh_query) *query = query_of(occluders_traced(s.field, s.triangles), NULL, 0, &options);
     FREED float *ao = calloc(s.flat.count, sizeof *ao);
     vsh_query_output output = vsh_query_output_default();
     output.ao = ao;
@@ -287,19 +287,15 @@ static double mean_ao_between_walls(const float *normals) {
     make_box(&walls[0], (double[]){-0.1, 0.0, -0.1}, (double[]){0.0, 3.0, 0.1});
     make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
     const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
-    OWNED(vshi_triangles) *triangles = NULL;
-    assert_ok(vshi_triangles_create(casters, 3, NULL, &triangles, &failure));
-    vshi_occluder_parts parts = {.field = NULL};
-    parts.triangles = triangles;
-    OWNED(vsh_occluders) *occluders = NULL;
-    assert_ok(vshi_occluders_from_parts(&parts, &occluders, &failure));
+    OWNED(vshi_triangles) *triangles = triangles_from(casters, 3);
+    OWNED(vsh_occluders) *occluders = occluders_from_triangles(triangles);
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = 128;
     options.padding = 0;
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = 50.0;
     options.shade.max_error = 0.01;
-    OWNED(vsh_charts) *charts = create(&strip.mesh, 1, options, NULL);
+    OWNED(vsh_charts) *charts = charts_from(&strip.mesh, 1, &options);
     static float ao[128 * 128], coverage[128 * 128];
     const vsh_lightmap planes = {.ao = ao, .coverage = coverage};
     assert_ok(vsh_bake_lightmap(occluders, charts, NULL, 0, NULL, NULL, &planes, NULL, &failure));

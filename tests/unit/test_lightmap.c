@@ -11,14 +11,6 @@ enum { SIZE = 64, TEXELS = SIZE * SIZE };
 #define VOXEL 0.04
 #define WALL 0.2 /* half its thickness */
 
-/* The floor y = 0 over [-1, 1]², facing up; u runs along x, v along -z. */
-static const float FLOOR_POSITIONS[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1};
-static const float QUAD_UVS[8] = {0, 0, 1, 0, 1, 1, 0, 1};
-
-static vsh_mesh floor_mesh(void) {
-    return quad_mesh("floor", FLOOR_POSITIONS, QUAD_UVS);
-}
-
 static double texel_x(uint32_t texel) {
     return -1.0 + 2.0 * (texel % SIZE + 0.5) / SIZE;
 }
@@ -32,10 +24,7 @@ static vsh_field *floor_field(int wall) {
 }
 
 static vsh_field *field_of_mesh(const vsh_mesh *mesh, double voxel) {
-    const vsh_grid_options options = with_voxel(voxel);
-    vsh_grid *grid = NULL;
-    assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
-    return field_of_grid(grid, 0.0);
+    return field_of_grid(grid_from_meshes(mesh, 1, voxel), 0.0);
 }
 
 static vsh_light sun(double x, double y, double z, double angle) {
@@ -79,7 +68,7 @@ typedef struct stage {
 static vsh_charts *charts_of(const vsh_mesh *mesh, int32_t size, int32_t supersample, int32_t padding) {
     vsh_lightmap_options options = size_of(size, size, supersample);
     options.padding = padding;
-    return create(mesh, 1, options, NULL);
+    return charts_from(mesh, 1, &options);
 }
 
 static stage begin(vsh_field *field, const vsh_mesh *mesh, int32_t size, int32_t supersample,
@@ -90,7 +79,7 @@ static stage begin(vsh_field *field, const vsh_mesh *mesh, int32_t size, int32_t
 /* The floor, with a wall on it or without. */
 static stage begin_floor(int wall, int32_t size, int32_t supersample, int32_t padding) {
     static vsh_mesh mesh; /* charts refer to it */
-    mesh = floor_mesh();
+    mesh = floor_mesh(NULL);
     return begin(floor_field(wall), &mesh, size, supersample, padding);
 }
 
@@ -149,7 +138,7 @@ TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
     /* The part x < -0.5 of the floor, all of it in shadow, and a chart around it. */
     const float positions[12] = {-1, 0, 1, -0.5f, 0, 1, -0.5f, 0, -1, -1, 0, -1};
     const float uvs[8] = {0.25f, 0.25f, 0.75f, 0.25f, 0.75f, 0.75f, 0.25f, 0.75f};
-    vsh_mesh mesh = floor_mesh();
+    vsh_mesh mesh = floor_mesh(NULL);
     mesh.positions = positions;
     mesh.uvs = uvs;
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
@@ -212,7 +201,7 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
 }
 
 TEST(an_open_sheet_does_not_shade_itself) {
-    const vsh_mesh mesh = floor_mesh();
+    const vsh_mesh mesh = floor_mesh(NULL);
     const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
     FREED_BY(end) stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
@@ -286,7 +275,7 @@ TEST(bad_options_and_limits_are_reported) {
 /* Bakes the floor under a wall by `method` into planes of values and errors. */
 static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_error, float *ao_error) {
     OWNED(vsh_field) *field = floor_field(1);
-    const vsh_mesh mesh = floor_mesh();
+    const vsh_mesh mesh = floor_mesh(NULL);
     OWNED(vsh_charts) *charts = charts_of(&mesh, SIZE, 2, 4);
     const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
     vsh_shade_options shade = preview_options();
@@ -561,7 +550,7 @@ TEST(a_lightmap_is_filled_to_its_last_corner) {
     for (int i = 0; i < 8; ++i) {
         uvs[i] = 0.1f + 0.2f * QUAD_UVS[i];
     }
-    vsh_mesh mesh = floor_mesh();
+    vsh_mesh mesh = floor_mesh(NULL);
     mesh.uvs = uvs;
     OWNED(vsh_charts) *charts = charts_of(&mesh, SIZE, 1, VSH_PADDING_AUTO),
                       *grown = charts_of(&mesh, SIZE, 1, 16);

@@ -106,7 +106,7 @@ TEST(new_uvs_leave_all_other_accessors_alone) {
     light_white(&l, VSH_LIT_OCCLUSION);
     forget_instances(&l);
     assert_kept(&l.in, &l.out, "mesh", "occlusionTexture");
-    assert_shows(path_of("out.glb").text, l.model, l.lit);
+    assert_shows(at("out.glb"), l.model, l.lit);
     /* the first mesh is used by two lit nodes, and by one elsewhere: it stays, and both have copies */
     assert_json_equal(item_of(&l.in, "meshes", 0), item_of(&l.out, "meshes", 0), "meshes[0]");
     for (size_t node = 1; node < 3; ++node) {
@@ -148,7 +148,7 @@ TEST(split_vertices_take_all_their_attributes_along) {
     light_white(&l, VSH_LIT_OCCLUSION);
     forget_instances(&l);
     assert_kept(&l.in, &l.out, "mesh", "occlusionTexture");
-    assert_shows(path_of("out.glb").text, l.model, l.lit);
+    assert_shows(at("out.glb"), l.model, l.lit);
     const json_t *old = primitive_of(&l.in, 0, 0);
     const json_t *left = primitive_of(&l.out, number_of(item_of(&l.out, "nodes", 1), "mesh"), 0);
     const json_t *right = primitive_of(&l.out, number_of(item_of(&l.out, "nodes", 2), "mesh"), 0);
@@ -209,10 +209,9 @@ TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
         const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
         const vsh_lit_options options = options_of(&image, 1);
         /* not by light_white(), which keeps it for validators: the image is none */
-        assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, &options, path_of("out.glb").text,
-                                NULL, &failure));
-        l.out = load_asset(path_of("out.glb").text);
-        assert_shows(path_of("out.glb").text, l.model, l.lit);
+        assert_ok(vsh_lit_write(at("in.glb"), l.model, l.lit, &options, at("out.glb"), NULL, &failure));
+        l.out = load_asset(at("out.glb"));
+        assert_shows(at("out.glb"), l.model, l.lit);
         for (size_t k = 0; k < 2; ++k) {
             char path[64];
             snprintf(path, sizeof path, "animations/0/samplers/%zu", k);
@@ -292,7 +291,7 @@ TEST(primitives_on_two_pages_become_two) {
         light(&l, &options);
         forget_instances(&l);
         assert_kept(&l.in, &l.out, "mesh", "extensions");
-        assert_shows(path_of("out.glb").text, l.model, l.lit);
+        assert_shows(at("out.glb"), l.model, l.lit);
         const size_t mesh = number_of(item_of(&l.out, "nodes", 1), "mesh");
         assert_int_equal(json_array_size(json_object_get(item_of(&l.out, "meshes", mesh), "primitives")), 2);
         size_t textures[2], triangles = 0;
@@ -323,9 +322,9 @@ TEST(other_formats_become_documents) {
     for (size_t i = 0; i < 2 * COUNT_OF(paths); ++i) {
         OWNED(vsh_model) *model = read_model(paths[i / 2]);
         vsh_lit_mesh *lit = make_all_lit(model, i % 2 != 0);
-        write_lit(paths[i / 2], model, lit, &options, path_of("out.glb").text);
-        assert_shows(path_of("out.glb").text, model, lit);
-        OWNED(vsh_model) *again = read_model(path_of("out.glb").text);
+        write_lit(paths[i / 2], model, lit, &options, at("out.glb"));
+        assert_shows(at("out.glb"), model, lit);
+        OWNED(vsh_model) *again = read_model(at("out.glb"));
         assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(model));
         for (size_t m = 0; m < vsh_model_mesh_count(model); ++m) {
             const vsh_mesh one = vsh_model_mesh(model, m, 0), other = vsh_model_mesh(again, m, 0);
@@ -347,11 +346,11 @@ TEST(compressed_primitives_that_change_are_written_plain_by_a_reader_too) {
         vsh_lit_mesh *lit = make_all_lit(model, split != 0);
         vsh_run run = vsh_run_default();
         run.reader = "/proc/self/exe";
-        assert_ok(vsh_lit_write(path, model, lit, &options, path_of("out.glb").text, &run, &failure));
-        FREED_BY(free_asset) asset by_reader = load_asset(path_of("out.glb").text);
-        write_lit(path, model, lit, &options, path_of("out.glb").text);
-        assert_shows(path_of("out.glb").text, model, lit);
-        FREED_BY(free_asset) asset out = load_asset(path_of("out.glb").text);
+        assert_ok(vsh_lit_write(path, model, lit, &options, at("out.glb"), &run, &failure));
+        FREED_BY(free_asset) asset by_reader = load_asset(at("out.glb"));
+        write_lit(path, model, lit, &options, at("out.glb"));
+        assert_shows(at("out.glb"), model, lit);
+        FREED_BY(free_asset) asset out = load_asset(at("out.glb"));
         FREED char *text = json_dumps(out.root, 0);
         assert_null(strstr(text, "draco"));
         assert_same_asset(&out, &by_reader);
@@ -369,10 +368,10 @@ static vsh_image_file *image_of(const asset *out, size_t texture) {
     const json_t *image = item_of(out, "images", number_of(item_of(out, "textures", texture), "source"));
     const size_t view = number_of(image, "bufferView");
     assert_string_equal(json_string_value(json_object_get(image, "mimeType")), "image/png");
-    write_bytes("image.png", bytes_of_view(out, view),
-                number_of(item_of(out, "bufferViews", view), "byteLength"));
+    write_all(at("image.png"), bytes_of_view(out, view),
+              number_of(item_of(out, "bufferViews", view), "byteLength"));
     vsh_image_file *file = NULL;
-    assert_ok(vsh_image_read(path_of("image.png").text, NULL, &file, &failure));
+    assert_ok(vsh_image_read(at("image.png"), NULL, &file, &failure));
     remove_file("image.png");
     return file;
 }
@@ -517,8 +516,8 @@ TEST(images_go_beside_a_gltf_with_its_buffer) {
     vsh_lit_options options = options_of(images, 2);
     options.chart_pages = pages;
     options.chart_count = 2;
-    write_lit(path_of("in.glb").text, l.model, l.lit, &options, path_of("a b.gltf").text);
-    l.out = load_asset(path_of("a b.gltf").text);
+    write_lit(at("in.glb"), l.model, l.lit, &options, at("a b.gltf"));
+    l.out = load_asset(at("a b.gltf"));
     assert_string_equal(text_at(&l.out, "buffers/0/uri"), "a%20b.bin");
     assert_string_equal(text_at(&l.out, "buffers/0/name"), "all");
     assert_string_equal(text_at(&l.out, "images/1/uri"), "a%20b.lightmap.0.png");
@@ -530,7 +529,7 @@ TEST(images_go_beside_a_gltf_with_its_buffer) {
         remove_file(written[i]);
     }
     /* and it can be read again */
-    OWNED(vsh_model) *again = read_model(path_of("a b.gltf").text);
+    OWNED(vsh_model) *again = read_model(at("a b.gltf"));
     assert_int_equal(vsh_model_mesh_count(again), vsh_model_mesh_count(l.model));
     remove_file("a b.gltf");
     remove_file("a b.bin");
@@ -541,15 +540,14 @@ TEST(images_are_copied_into_another_folder) {
     put_item(&in, "images", parsed("{\"uri\":\"gone.png\"}"));
     put_item(&in, "images", parsed("{\"uri\":\"link.png\"}"));
     put_item(&in, "images", parsed("{\"uri\":\"https://a.b/c.png\"}"));
-    assert_int_equal(symlink("/etc/passwd", path_of("link.png").text), 0);
-    assert_int_equal(mkdir(path_of("other").text, 0777), 0);
+    assert_int_equal(symlink("/etc/passwd", at("link.png")), 0);
+    assert_int_equal(mkdir(at("other"), 0777), 0);
     FREED_BY(end_lighting) lighting l = begin_lighting(in, false);
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     warnings[0] = '\0';
-    assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, NULL, NULL, path_of("other/out.glb").text, &run,
-                            &failure));
-    l.out = load_asset(path_of("other/out.glb").text);
+    assert_ok(vsh_lit_write(at("in.glb"), l.model, NULL, NULL, at("other/out.glb"), &run, &failure));
+    l.out = load_asset(at("other/out.glb"));
     assert_null(text_at(&l.out, "images/0/uri"));
     assert_string_equal(text_at(&l.out, "images/0/name"), "tile");
     assert_memory_equal(bytes_of_view(&l.out, number_of(item_of(&l.out, "images", 0), "bufferView")),
@@ -560,7 +558,7 @@ TEST(images_are_copied_into_another_folder) {
     assert_non_null(strstr(warnings, "gone.png"));
     assert_non_null(strstr(warnings, "outside of the model's folder"));
     remove_file("other/out.glb");
-    assert_int_equal(rmdir(path_of("other").text), 0);
+    assert_int_equal(rmdir(at("other")), 0);
     remove_file("link.png");
 }
 
@@ -589,7 +587,7 @@ static asset make_scene(void) {
 /* Lights a file, whose first object may be on a page of its own. */
 static void light_file(const char *in, int purposes, uint32_t pages, int32_t place, const char *out,
                        const vsh_run *run) {
-    OWNED(vsh_model) *model = read_model(path_of(in).text);
+    OWNED(vsh_model) *model = read_model(at(in));
     vsh_lit_mesh *lit = make_all_lit(model, true);
     lit[0].page = pages - 1;
     vsh_lit_image images[4];
@@ -601,15 +599,15 @@ static void light_file(const char *in, int purposes, uint32_t pages, int32_t pla
     }
     vsh_lit_options options = options_of(images, count);
     options.image_place = place;
-    assert_ok(vsh_lit_write(path_of(in).text, model, lit, &options, path_of(out).text, run, &failure));
-    keep_file(path_of(out).text);
+    assert_ok(vsh_lit_write(at(in), model, lit, &options, at(out), run, &failure));
+    keep_file(at(out));
     free_lit(lit, vsh_model_mesh_count(model));
 }
 
 static asset light_again(const asset *in, int purposes, uint32_t pages) {
     write_glb(in, "in.glb");
     light_file("in.glb", purposes, pages, VSH_LIT_IMAGES_EMBED, "out.glb", NULL);
-    asset out = load_asset(path_of("out.glb").text);
+    asset out = load_asset(at("out.glb"));
     remove_file("in.glb");
     remove_file("out.glb");
     return out;
@@ -727,9 +725,9 @@ TEST(files_that_were_made_are_left_and_no_longer_named) {
     FREED_BY(free_asset) asset in = make_scene();
     write_glb(&in, "in.glb");
     light_file("in.glb", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "lit.gltf", NULL);
-    FREED_BY(free_asset) asset one = load_asset(path_of("lit.gltf").text);
+    FREED_BY(free_asset) asset one = load_asset(at("lit.gltf"));
     light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "again.gltf", NULL);
-    FREED_BY(free_asset) asset two = load_asset(path_of("again.gltf").text);
+    FREED_BY(free_asset) asset two = load_asset(at("again.gltf"));
     assert_counts(&one, &two, LISTS);
     assert_string_equal(text_at(&two, "images/2/uri"), "again.lightmap.png");
     assert_int_equal(one.size, two.size);
@@ -738,10 +736,10 @@ TEST(files_that_were_made_are_left_and_no_longer_named) {
     vsh_run run = vsh_run_default();
     run.warning = keep_warning;
     warnings[0] = '\0';
-    assert_int_equal(mkdir(path_of("other").text, 0777), 0);
+    assert_int_equal(mkdir(at("other"), 0777), 0);
     light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "other/lit.gltf", &run);
     assert_string_equal(warnings, "");
-    FREED_BY(free_asset) asset far = load_asset(path_of("other/lit.gltf").text);
+    FREED_BY(free_asset) asset far = load_asset(at("other/lit.gltf"));
     assert_string_equal(text_at(&far, "images/2/uri"), "lit.lightmap.png");
     assert_int_equal(far.size, one.size);
     static const char *const left[] = {"in.glb",         "lit.gltf",      "lit.bin",
@@ -750,7 +748,7 @@ TEST(files_that_were_made_are_left_and_no_longer_named) {
     for (size_t i = 0; i < COUNT_OF(left); ++i) {
         remove_file(left[i]);
     }
-    assert_int_equal(rmdir(path_of("other").text), 0);
+    assert_int_equal(rmdir(at("other")), 0);
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

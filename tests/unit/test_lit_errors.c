@@ -23,15 +23,14 @@ static lighting begin_sound(void) {
     json_object_del(json_at(in.root, "nodes/1"), "extensions");
     json_object_del(json_at(in.root, "extensions"), "VENDOR_sound");
     const lighting l = begin_lighting(in, true);
-    write_bytes("out.glb", old_output, sizeof old_output);
+    write_all(at("out.glb"), old_output, sizeof old_output);
     return l;
 }
 
 static vsh_result write_in(const lighting *l, const vsh_run *run) {
     const vsh_lit_image image = white_image(VSH_LIT_OCCLUSION, 0);
     const vsh_lit_options options = options_of(&image, 1);
-    return vsh_lit_write(path_of("in.glb").text, l->model, l->lit, &options, path_of("out.glb").text, run,
-                         &failure);
+    return vsh_lit_write(at("in.glb"), l->model, l->lit, &options, at("out.glb"), run, &failure);
 }
 
 /* --- documents */
@@ -120,10 +119,10 @@ TEST(damaged_buffers_are_refused) {
 
 TEST(cut_files_are_refused_at_every_length) {
     FREED_BY(end_lighting) lighting l = begin_sound();
-    size_t size;
-    FREED unsigned char *bytes = load_bytes(path_of("in.glb").text, &size);
+    FREED unsigned char *bytes = NULL;
+    const size_t size = read_all(at("in.glb"), &bytes);
     for (size_t cut = 0; cut < size; cut += cut < 64 || cut + 64 > size ? 1 : 37) {
-        write_bytes("in.glb", bytes, cut);
+        write_all(at("in.glb"), bytes, cut);
         assert_refused(write_in(&l, NULL), "");
     }
 }
@@ -188,8 +187,7 @@ TEST(images_out_of_range_are_refused) {
                         };
     for (size_t i = 0; i < COUNT_OF(bad); ++i) {
         const vsh_lit_options options = options_of(bad[i], bad[i][1].png != NULL ? 2 : 1);
-        assert_refused(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, &options,
-                                     path_of("out.glb").text, NULL, &failure),
+        assert_refused(vsh_lit_write(at("in.glb"), l.model, l.lit, &options, at("out.glb"), NULL, &failure),
                        "");
         assert_int_equal(failure.code, VSH_ERROR_ARGUMENT);
     }
@@ -203,8 +201,7 @@ TEST(outputs_that_are_inputs_are_refused) {
     } cases[] = {
         {"in.glb", VSH_ERROR_ARGUMENT}, {"out.ply", VSH_ERROR_ARGUMENT}, {"none/out.glb", VSH_ERROR_WRITE}};
     for (size_t i = 0; i < 3; ++i) {
-        assert_fails(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, NULL,
-                                   path_of(cases[i].output).text, NULL, &failure),
+        assert_fails(vsh_lit_write(at("in.glb"), l.model, l.lit, NULL, at(cases[i].output), NULL, &failure),
                      cases[i].code, "");
     }
 }
@@ -212,12 +209,11 @@ TEST(outputs_that_are_inputs_are_refused) {
 /* Another document may use these files too. */
 TEST(files_of_the_input_are_not_replaced_but_others_named) {
     FREED_BY(end_lighting) lighting l = begin_sound();
-    write_bytes("all.bin", l.in.bytes, l.in.size);
+    write_all(at("all.bin"), l.in.bytes, l.in.size);
     set_at(&l.in, "buffers/0", "uri", json_string("all.bin"));
     write_glb(&l.in, "in.glb");
-    assert_ok(vsh_lit_write(path_of("in.glb").text, l.model, l.lit, NULL, path_of("all.gltf").text, NULL,
-                            &failure));
-    FREED_BY(free_asset) asset out = load_asset(path_of("all.gltf").text);
+    assert_ok(vsh_lit_write(at("in.glb"), l.model, l.lit, NULL, at("all.gltf"), NULL, &failure));
+    FREED_BY(free_asset) asset out = load_asset(at("all.gltf"));
     assert_string_equal(text_at(&out, "buffers/0/uri"), "all.1.bin");
     assert_file("all.bin", l.in.bytes, l.in.size);
     remove_file("all.gltf");
@@ -234,4 +230,4 @@ TEST(limits_leave_the_old_file) {
     }
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

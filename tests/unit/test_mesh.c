@@ -13,11 +13,7 @@ static const uint32_t cube_indices[12][3] = {{0, 2, 3}, {0, 3, 1}, {0, 1, 5}, {0
                                              {1, 3, 7}, {1, 7, 5}, {4, 5, 7}, {4, 7, 6}};
 
 static vsh_mesh cube(void) {
-    return (vsh_mesh){.name = "cube",
-                      .positions = cube_positions[0],
-                      .indices = cube_indices[0],
-                      .vertex_count = 8,
-                      .triangle_count = 12};
+    return mesh_of_arrays("cube", cube_positions[0], NULL, 8, cube_indices[0], 12);
 }
 
 static vsh_mesh_report check(const vsh_mesh *mesh) {
@@ -118,10 +114,8 @@ TEST(edges_area_and_bounds_of_cubes_are_right) {
         memcpy(s.positions, cube_positions, sizeof cube_positions);
         memcpy(s.indices, cube_indices, sizeof cube_indices);
         cases[i].change(&s);
-        const vsh_mesh mesh = {.positions = s.positions[0],
-                               .indices = s.indices[0],
-                               .vertex_count = s.vertices,
-                               .triangle_count = s.triangles};
+        const vsh_mesh mesh =
+            mesh_of_arrays(NULL, s.positions[0], NULL, s.vertices, s.indices[0], s.triangles);
         const vsh_mesh_report report = check(&mesh);
         assert_int_equal(report.open_edges, cases[i].open_edges);
         assert_int_equal(report.flipped_edges, cases[i].flipped_edges);

@@ -272,7 +272,7 @@ TEST(bad_gltf_is_refused) {
 
 TEST(files_that_cannot_be_read_are_refused_with_a_reason) {
     vsh_model *model;
-    assert_fails(vsh_model_read(path_of("missing.obj").text, NULL, &model, &failure), VSH_ERROR_READ,
+    assert_fails(vsh_model_read(at("missing.obj"), NULL, &model, &failure), VSH_ERROR_READ,
                  "missing.obj: No such file");
     assert_null(model);
     char as_folder[512];
@@ -461,7 +461,7 @@ TEST(material_libraries_decide_which_meshes_are_blended) {
                                     "newmtl edge\nd -halo 0.0\nnewmtl last\nd 1.0\n";
     static const char *const names[] = {"clear", "solid", "thin", "edge", "last", "other"};
     static const bool blended[] = {true, false, true, true, false, false};
-    write_bytes("own.mtl", materials, sizeof materials - 1);
+    write_all(at("own.mtl"), materials, sizeof materials - 1);
     for (size_t i = 0; i < COUNT_OF(names); ++i) {
         char text[512];
         snprintf(text, sizeof text, "mtllib %s\n%susemtl %s\nf 1 2 3\n", i % 2 == 0 ? "own.mtl" : "gone.mtl",
@@ -477,11 +477,11 @@ TEST(material_libraries_decide_which_meshes_are_blended) {
         assert_int_equal(told.alpha, blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);
         assert_string_equal(vsh_model_mesh(model, 0, 0).material_name, names[i]);
     }
-    write_bytes("own.mtl", "newmtl a\nd x\n", 13);
+    write_all(at("own.mtl"), "newmtl a\nd x\n", 13);
     vsh_model *none = NULL;
     assert_fails(read_bytes("own.obj", "mtllib own.mtl\n", 15, &none, &failure), VSH_ERROR_INPUT,
                  "own.mtl: line 2: 'd' is 'x'");
-    assert_int_equal(unlink(path_of("own.mtl").text), 0);
+    assert_int_equal(unlink(at("own.mtl")), 0);
 }
 
 /* A small file can unfold to much memory, which is compared with the limit first. */
@@ -493,16 +493,15 @@ TEST(memory_is_held_against_the_limit) {
     for (int i = 0; i < COUNT; ++i) {
         to += sprintf(to, "f 1 2 3\n");
     }
-    write_bytes("limit.obj", text, (size_t)(to - text));
+    write_all(at("limit.obj"), text, (size_t)(to - text));
     vsh_run run = vsh_run_default();
     OWNED(vsh_model) *model = NULL;
     run.memory_limit = 1000000;
-    assert_fails(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure), VSH_ERROR_LIMIT,
-                 "limit.obj");
+    assert_fails(vsh_model_read(at("limit.obj"), &run, &model, &failure), VSH_ERROR_LIMIT, "limit.obj");
     assert_null(model);
     run.memory_limit = 3000000;
-    assert_ok(vsh_model_read(path_of("limit.obj").text, &run, &model, &failure));
-    assert_int_equal(unlink(path_of("limit.obj").text), 0);
+    assert_ok(vsh_model_read(at("limit.obj"), &run, &model, &failure));
+    assert_int_equal(unlink(at("limit.obj")), 0);
 }
 
-FIXTURE(make_folder, remove_folder)
+FIXTURE(make_folder, remove_empty_folder)

@@ -187,8 +187,7 @@ TEST(baking_without_its_arguments_is_refused) {
     vsh_charts *charts = NULL;
     const float corners[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0}, places[6] = {0, 0, 1, 0, 0, 1};
     const uint32_t triangle[3] = {0, 1, 2};
-    const vsh_mesh one = {
-        .positions = corners, .uvs = places, .indices = triangle, .vertex_count = 3, .triangle_count = 1};
+    const vsh_mesh one = mesh_of_arrays(NULL, corners, places, 3, triangle, 1);
     assert_int_equal(vsh_charts_create(&one, 1, NULL, NULL, NULL, &charts, &error), VSH_OK);
     REFUSED(stitch_one(charts, NULL, 1, NULL, NULL, NULL, &error));
     vsh_charts_free(charts);

@@ -1,19 +1,11 @@
 /* Occluders from meshes, from parts and from a scene. */
-#include "field/field.h"
-#include "fields.h"
-#include "previews.h"
 #include "scenes.h"
 #include "shading.h"
 #include "testing.h"
-
-/* A square plate of 2 × 2 at y = 1, and of 0.2 thick. */
-static vsh_mesh plate(void) {
-    static float corners[24];
-    return box_mesh(corners, (const double[]){-1.0, 0.8, -1.0}, (const double[]){1.0, 1.0, 1.0});
-}
+#include "truth/metrics.h"
 
 TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
-    const vsh_mesh mesh = plate();
+    const vsh_mesh mesh = plate_mesh();
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = 64;
     options.reach = 2.0;
@@ -28,15 +20,10 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
     uint64_t counter = 7;
     for (int i = 0; i < 200; ++i) {
         const double at[3] = {between(&counter, -2, 2), between(&counter, -2, 2), between(&counter, -2, 2)};
-        float ours, theirs;
-        vsh_field_sample(parts.field, 1, at, &ours);
-        vsh_field_sample(field, 1, at, &theirs);
-        assert_int_equal(bits_of(ours), bits_of(theirs));
+        assert_int_equal(bits_of(distance_at(parts.field, at)), bits_of(distance_at(field, at)));
     }
-    vsh_field_info of_field;
-    vsh_field_get_info(field, &of_field);
-    vsh_occluders_info info;
-    vsh_occluders_get_info(made, &info);
+    const vsh_field_info of_field = field_info(field);
+    vsh_occluders_info info = occluders_info(made);
     assert_true(info.field_bytes == of_field.bytes && info.bricks == of_field.bricks);
     assert_true(info.voxel_size == of_field.voxel_size && info.levels == of_field.levels);
     assert_true(info.grid_bytes > 0 && info.voxelize_s > 0.0 && info.field_s > 0.0);
@@ -44,7 +31,7 @@ TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
 
     options.triangles = 0;
     assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &bare, &failure));
-    vsh_occluders_get_info(bare, &info);
+    info = occluders_info(bare);
     assert_true(info.has_triangles == 0 && info.triangles_bytes == 0);
 }
 
@@ -64,7 +51,7 @@ TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
                  {8, 1, &behind, NULL, VSH_ERROR_ARGUMENT},
                  {8, 1, NULL, &run, VSH_ERROR_LIMIT}};
     for (size_t i = 0; i < COUNT_OF(cases); ++i) {
-        vsh_mesh mesh = plate();
+        vsh_mesh mesh = plate_mesh();
         mesh.vertex_count = cases[i].vertex_count;
         vsh_occluders *made = (vsh_occluders *)&failure;
         assert_fails(
@@ -125,11 +112,8 @@ TEST(layers_without_a_field_define_the_unit_of_offsets) {
         assert_ok(vshi_occluders_from_parts(&parts, &made, &failure));
         const vshi_occluder_parts views = parts_of(made);
         assert_int_equal(views.layer_count, cases[i].layers);
-        vsh_field_info info;
-        vsh_field_get_info(views.field, &info);
-        assert_true(info.voxel_size == cases[i].expected);
-        vsh_occluders_info counted; /* the field of nothing is none */
-        vsh_occluders_get_info(made, &counted);
+        assert_true(field_info(views.field).voxel_size == cases[i].expected);
+        const vsh_occluders_info counted = occluders_info(made); /* the field of nothing is none */
         assert_true((counted.field_bytes > 0) == (cases[i].layers == 2));
         assert_true(counted.voxel_size == (cases[i].layers == 2 ? 0.125 : 0.0));
     }
@@ -148,9 +132,7 @@ TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
     const vshi_occluder_parts parts = parts_of(made);
     assert_true(parts.triangles == NULL && parts.layer_count == 0);
     OWNED(vsh_field) *field = field_of_grid(grid, 3.0);
-    vsh_field_info ours, theirs;
-    vsh_field_get_info(parts.field, &ours);
-    vsh_field_get_info(field, &theirs);
+    const vsh_field_info ours = field_info(parts.field), theirs = field_info(field);
     assert_memory_equal(&ours, &theirs, sizeof ours);
 }
 
@@ -170,7 +152,7 @@ static float lit_under(const vsh_occluders *occluders, int32_t method, vsh_resul
 }
 
 TEST(auto_is_exact_where_triangles_are_kept_and_adaptive_where_not) {
-    const vsh_mesh mesh = plate();
+    const vsh_mesh mesh = plate_mesh();
     for (int32_t kept = 0; kept < 2; ++kept) {
         vsh_occluders_options options = vsh_occluders_options_default();
         options.grid.resolution = 16;
@@ -356,7 +338,7 @@ static void shade_plainly(const vsh_occluders *occluders, const vsh_light *light
 static void shade_ao(const vsh_occluders *occluders, float *values) {
     const vsh_points points = {COUNT, positions, normals, NULL};
     const vsh_shade_options options = preview_options();
-    shade_ao_points(occluders, &points, &options, NULL, values);
+    shade_ao_points(occluders, &points, &options, NULL, values, NULL);
 }
 
 static void assert_all(const float *values, double expected, double tolerance) {
@@ -431,13 +413,11 @@ TEST(layers_whose_shadows_do_not_meet_shade_like_their_union) {
     shade_plainly(occluders_of(all), &light, united);
     shade_plainly(occluders_with(a, &layer, 1), &light, layered);
     size_t dark = 0;
-    double square = 0.0;
     for (size_t i = 0; i < COUNT; ++i) {
         dark += united[i] < 0.1f;
-        square += (double)((layered[i] - united[i]) * (layered[i] - united[i]));
     }
     assert_true(dark > 40);
-    assert_true(sqrt(square / COUNT) < 2e-3);
+    assert_less(truth_compare(COUNT, layered, united, NULL).rmse, 2e-3);
 }
 
 /* The darker of both is the field alone, bit by bit, the product its square. */
@@ -539,15 +519,12 @@ typedef struct floor_bake {
 
 static void bake_floor(const vsh_field *field, const vshi_layer *layers, size_t layer_count,
                        floor_bake *baked) {
-    static const float corners[12] = {-1, 0, 1, 1, 0, 1, 1, 0, -1, -1, 0, -1},
-                       uvs[8] = {0, 0, 1, 0, 1, 1, 0, 1};
-    const vsh_mesh mesh = quad_mesh("floor", corners, uvs);
+    const vsh_mesh mesh = floor_mesh(NULL);
     vsh_lightmap_options options = preview_lightmap_options();
     options.width = options.height = SIZE;
     options.padding = 0;
     options.ao_spacing = 1;
-    OWNED(vsh_charts) *texels = NULL;
-    assert_ok(vsh_charts_create(&mesh, 1, &options, NULL, NULL, &texels, &failure));
+    OWNED(vsh_charts) *texels = charts_from(&mesh, 1, &options);
     const double over[3] = {-1.0, 0.7, 0.1};
     const vsh_light light = sun(over, 0.2);
     const vsh_shade_options shade = preview_options();

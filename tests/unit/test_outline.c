@@ -1,10 +1,11 @@
 /* Outlines of polygons, of text and of images against closed forms. */
+#include "folder.h"
 #include "grids.h"
 #include "outlines.h"
 #include "testing.h"
 
 TEST(the_tree_finds_the_same_distance_as_a_search_of_all_edges) {
-    OWNED(vsh_outline) *letters = text("R&8\nqi%", 1.0);
+    OWNED(vsh_outline) *letters = lines_of("R&8\nqi%", VSH_ALIGN_CENTER);
     int inside = 0;
     for (int i = 0; i < 2000; ++i) {
         const double p[2] = {5.0 * any(2 * (uint64_t)i) - 2.5, 4.0 * any(2 * (uint64_t)i + 1) - 2.5};
@@ -19,12 +20,6 @@ TEST(the_tree_finds_the_same_distance_as_a_search_of_all_edges) {
 }
 
 /* --- the area that contours wind around */
-
-static vsh_outline *polygons(const double *points, const size_t *counts, size_t count) {
-    vsh_outline *outline = NULL;
-    assert_ok(vsh_outline_from_polygons(points, counts, count, NULL, &outline, &failure));
-    return outline;
-}
 
 TEST(overlapping_squares_are_one_area) {
     /* The second runs backwards and is moved to 1 … 3. Their overlap, 1 × 1, counts as inside. */
@@ -123,14 +118,6 @@ TEST(many_overlaps_leave_the_union) {
 }
 
 /* --- text */
-
-static vsh_outline *lines_of(const char *letters, int32_t align) {
-    vsh_text_options options = vsh_text_options_default();
-    options.align = align;
-    vsh_outline *outline = NULL;
-    assert_ok(vshi_outline_from_text(letters, FONT, &options, NULL, &outline, &failure));
-    return outline;
-}
 
 static double width_of(const char *letters) {
     OWNED(vsh_outline) *outline = lines_of(letters, VSH_ALIGN_LEFT);
@@ -263,12 +250,10 @@ TEST(bad_polygons_are_refused) {
 
 static const double at_corner[2] = {3.0, 4.0};
 
-static char image_path[] = "vsh-outline-XXXXXX.exr";
-
 static void write_image(int32_t width, int32_t height, int32_t channels, const char *const *names,
                         const float *const *planes) {
     const vsh_image image = {width, height, channels, names, planes, NULL};
-    assert_ok(vsh_image_write(image_path, &image, NULL, &failure));
+    assert_ok(vsh_image_write(at("mask.exr"), &image, NULL, &failure));
 }
 
 static void write_mask(int32_t width, int32_t height, const float *plane) {
@@ -278,7 +263,7 @@ static void write_mask(int32_t width, int32_t height, const float *plane) {
 
 static vsh_outline *outline_of_image(const vsh_mask_options *options) {
     vsh_outline *outline = NULL;
-    assert_ok(vshi_outline_from_image(image_path, options, NULL, &outline, &failure));
+    assert_ok(vshi_outline_from_image(at("mask.exr"), options, NULL, &outline, &failure));
     return outline;
 }
 
@@ -423,8 +408,8 @@ TEST(bad_images_are_refused) {
         options.channel = cases[i].channel;
         options.width = cases[i].width;
         options.threshold = cases[i].threshold;
-        assert_fails(vshi_outline_from_image(image_path, &options, NULL, &outline, &failure), cases[i].code,
-                     cases[i].part);
+        assert_fails(vshi_outline_from_image(at("mask.exr"), &options, NULL, &outline, &failure),
+                     cases[i].code, cases[i].part);
         assert_null(outline);
     }
     assert_fails(vshi_outline_from_image("none.png", &options, NULL, &outline, &failure), VSH_ERROR_READ,
@@ -437,30 +422,20 @@ TEST(bad_images_are_refused) {
     write_mask(SIZE, SIZE, noise);
     vsh_run run = vsh_run_default();
     for (run.memory_limit = 100000; run.memory_limit < 5000000; run.memory_limit *= 3) {
-        assert_fails(vshi_outline_from_image(image_path, &options, &run, &outline, &failure), VSH_ERROR_LIMIT,
-                     "limit");
+        assert_fails(vshi_outline_from_image(at("mask.exr"), &options, &run, &outline, &failure),
+                     VSH_ERROR_LIMIT, "limit");
         assert_null(outline);
     }
 }
 
-static int remove_image(void **state) {
-    unlink(image_path);
-    return 0;
-}
-
-static int name_image(void **state) {
-    const int file = mkstemps(image_path, 4);
-    return file < 0 || close(file) != 0;
-}
-
 /* --- outlines extruded to solids */
 
-static vsh_outline *rectangle(double x, double y) {
-    const double points[8] = {-x, -y, x, -y, x, y, -x, y};
-    const size_t count = 4;
-    vsh_outline *outline = NULL;
-    assert_ok(vsh_outline_from_polygons(points, &count, 1, NULL, &outline, &failure));
-    return outline;
+static vsh_grid *grid_of(const vsh_outline *outline, double thickness, const double *transform, double voxel,
+                         const vsh_run *run) {
+    const vsh_grid_options options = with_voxel(voxel);
+    vsh_grid *grid = NULL;
+    assert_ok(vsh_grid_from_outline(outline, thickness, transform, &options, run, &grid, &failure));
+    return grid;
 }
 
 /* A box of half size (1, 0.5, 0.3), in its own space. */
@@ -468,15 +443,6 @@ static double box_distance(const double p[3]) {
     const double q[3] = {fabs(p[0]) - 1.0, fabs(p[1]) - 0.5, fabs(p[2]) - 0.3};
     const double outside = hypot(hypot(fmax(q[0], 0.0), fmax(q[1], 0.0)), fmax(q[2], 0.0));
     return outside + fmin(0.0, fmax(q[0], fmax(q[1], q[2])));
-}
-
-TEST(an_extruded_square_has_the_distance_of_a_box) {
-    OWNED(vsh_outline) *outline = rectangle(1.0, 0.5);
-    OWNED(vsh_grid) *grid = NULL;
-    const vsh_grid_options options = with_voxel(0.02);
-    assert_ok(vsh_grid_from_outline(outline, 0.6, NULL, &options, NULL, &grid, &failure));
-    const double worst = worst_error(grid, box_distance, 2.9, 2.9);
-    assert_true(worst < 1e-5);
 }
 
 /* Mirrored in x, scaled by 2, turned by 90° about x and moved. */
@@ -487,55 +453,34 @@ static double placed_distance(const double p[3]) {
     return 2.0 * box_distance(local);
 }
 
-TEST(a_transform_moves_the_solid) {
-    OWNED(vsh_outline) *outline = rectangle(1.0, 0.5);
-    OWNED(vsh_grid) *grid = NULL;
-    const vsh_grid_options options = with_voxel(0.05);
-    assert_ok(vsh_grid_from_outline(outline, 0.6, placed, &options, NULL, &grid, &failure));
-    assert_true(worst_error(grid, placed_distance, 2.9, 2.9) < 1e-5);
+TEST(an_extruded_rectangle_has_the_distance_of_a_box_also_where_it_is_moved) {
+    OWNED(vsh_outline) *outline = box(-1.0, -0.5, 1.0, 0.5);
+    OWNED(vsh_grid) *here = grid_of(outline, 0.6, NULL, 0.02, NULL),
+                    *there = grid_of(outline, 0.6, placed, 0.05, NULL);
+    assert_less(worst_error(here, box_distance, 2.9, 2.9), 1e-5);
+    assert_less(worst_error(there, placed_distance, 2.9, 2.9), 1e-5);
 }
 
 static vsh_outline *letters;
 
-/* By every segment in turn, and a count of crossings. */
 static double letters_distance(const double p[3]) {
-    double least = INFINITY;
-    int winding = 0;
-    size_t count;
-    const double *q;
-    for (size_t c = 0; (q = vshi_outline_contour(letters, c, &count)) != NULL; ++c) {
-        for (size_t i = 0; i < count; ++i) {
-            const double *a = q + 2 * i, *b = q + 2 * ((i + 1) % count);
-            const double dx = b[0] - a[0], dy = b[1] - a[1];
-            double t = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy);
-            t = fmin(1.0, fmax(0.0, t));
-            least = fmin(least, hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy));
-            if ((a[1] <= p[1]) != (b[1] <= p[1]) && a[0] + (p[1] - a[1]) * dx / dy > p[0]) {
-                winding += dy > 0.0 ? 1 : -1;
-            }
-        }
-    }
-    const double flat = winding != 0 ? -least : least, above = fabs(p[2]) - 0.1;
+    const double least = sqrt(truth_square(letters, p[0], p[1]));
+    const double flat = truth_inside(letters, p[0], p[1]) ? -least : least, above = fabs(p[2]) - 0.1;
     return flat > 0.0 && above > 0.0 ? hypot(flat, above) : fmax(flat, above);
 }
 
 TEST(text_is_extruded_with_its_distance) {
-    assert_ok(vshi_outline_from_text("d&", "/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf", NULL, NULL,
-                                     &letters, &failure));
-    OWNED(vsh_grid) *grid = NULL, *again = NULL;
-    vsh_run run = vsh_run_default();
-    const vsh_grid_options options = with_voxel(0.03);
-    assert_ok(vsh_grid_from_outline(letters, 0.2, NULL, &options, &run, &grid, &failure));
-    const double worst = worst_error(grid, letters_distance, 2.9, 2.9);
-    assert_true(worst < 1e-5);
-    run.threads = 1;
-    assert_ok(vsh_grid_from_outline(letters, 0.2, NULL, &options, &run, &again, &failure));
+    letters = lines_of("d&", VSH_ALIGN_LEFT);
+    const vsh_run one = run_on(1);
+    OWNED(vsh_grid) *grid = grid_of(letters, 0.2, NULL, 0.03, NULL),
+                    *again = grid_of(letters, 0.2, NULL, 0.03, &one);
+    assert_less(worst_error(grid, letters_distance, 2.9, 2.9), 1e-5);
     assert_same_leaves(grid, again, 0.0f);
     vsh_outline_free(letters);
 }
 
 TEST(bad_solids_are_refused) {
-    OWNED(vsh_outline) *outline = rectangle(1.0, 0.5);
+    OWNED(vsh_outline) *outline = box(-1.0, -0.5, 1.0, 0.5);
     vsh_grid *grid = NULL;
     const vsh_grid_options options = with_voxel(0.02);
     const double thicknesses[] = {0.0, -1.0, NAN, INFINITY, 1e16};
@@ -553,4 +498,4 @@ TEST(bad_solids_are_refused) {
     assert_null(grid);
 }
 
-FIXTURE(name_image, remove_image)
+FIXTURE(make_folder, remove_folder)

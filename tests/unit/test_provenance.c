@@ -56,17 +56,13 @@ static const char *value_of(const vsh_attribute *list, size_t count, const char 
     return NULL;
 }
 
-static void write_text(const char *name, const char *text) {
-    write_all(at(name), (const unsigned char *)text, strlen(text));
-}
-
 /* A glTF with a buffer beside it, one within, and one behind an escaped name. */
 TEST(settings_and_inputs_are_listed_in_order_and_once) {
-    write_text("scene.json", "{}");
-    write_text("one.bin", "1");
-    write_text("two parts.bin", "2");
-    write_text("mesh.gltf", "{\"buffers\": [{\"uri\": \"one.bin\"}, {\"uri\": \"data:,x\"}, {\"uri\": "
-                            "\"two%20parts.bin\"}, {\"byteLength\": 1}]}");
+    write_string(at("scene.json"), "{}");
+    write_string(at("one.bin"), "1");
+    write_string(at("two parts.bin"), "2");
+    write_string(at("mesh.gltf"), "{\"buffers\": [{\"uri\": \"one.bin\"}, {\"uri\": \"data:,x\"}, {\"uri\": "
+                                  "\"two%20parts.bin\"}, {\"byteLength\": 1}]}");
     const vsh_caster casters[] = {{.type = VSH_CASTER_MESH, .path = at("mesh.gltf")},
                                   {.type = VSH_CASTER_SDF},
                                   {.type = VSH_CASTER_MESH, .path = casters[0].path}};
@@ -139,7 +135,7 @@ TEST(files_that_a_large_glb_names_are_found_from_its_json_alone) {
     memcpy(bytes, head, sizeof head);
     memcpy(bytes + sizeof head, json, SIZE);
     memcpy(bytes + sizeof head + SIZE, binary, sizeof binary);
-    write_text("one.bin", "1");
+    write_string(at("one.bin"), "1");
     write_all(at("large.glb"), bytes, sizeof bytes);
     assert_int_equal(truncate(at("large.glb"), ALL), 0);
     const vsh_caster caster = {.type = VSH_CASTER_MESH, .path = at("large.glb")};
@@ -191,9 +187,8 @@ TEST(images_carry_them_and_give_them_back) {
         vsh_image_options options = vsh_image_options_default();
         options.attributes = told;
         options.attribute_count = 2;
-        vsh_image_file *file = NULL;
         assert_ok(vsh_image_write(at(files[f]), &s.image, &options, &failure));
-        assert_ok(vsh_image_read(at(files[f]), NULL, &file, &failure));
+        OWNED(vsh_image_file) *file = image_from(at(files[f]));
         size_t count = 0;
         const vsh_attribute *list = vsh_image_attributes(file, &count);
         for (size_t i = 0; i < 2; ++i) {
@@ -202,7 +197,6 @@ TEST(images_carry_them_and_give_them_back) {
             assert_string_equal(value, told[i].value);
         }
         assert_null(value_of(list, count, "type"));
-        vsh_image_free(file);
     }
     unmake(&s);
 }

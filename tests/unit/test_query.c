@@ -43,13 +43,6 @@ static int fill_points(void **state) {
     return 0;
 }
 
-static vsh_query *query_of(const vsh_occluders *occluders, const vsh_light *given, size_t count,
-                           const vsh_shade_options *options) {
-    vsh_query *query = NULL;
-    assert_ok(vsh_query_create(occluders, given, count, options, &query, &failure));
-    return query;
-}
-
 /* Everything of `points`, into values and deviations; AO is the last. */
 static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int32_t threads) {
     float *const visibility[LIGHTS] = {values[0], values[1]};
@@ -224,8 +217,7 @@ TEST(the_memory_limit_is_held) {
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
     const vsh_points shuffled = {MANY, shuffled_positions, shuffled_normals, NULL};
-    vsh_field_info info;
-    vsh_field_get_info(field, &info);
+    const vsh_field_info info = field_info(field);
     vsh_run run = run_within(info.bytes + 16 * MANY - 4096);
     assert_fails(vsh_query_points(query, &shuffled, NULL, &run, &output, NULL, &failure), VSH_ERROR_LIMIT,
                  "query");

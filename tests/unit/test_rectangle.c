@@ -3,6 +3,7 @@
 #include "field/field.h"
 #include "testing.h"
 #include "traced.h"
+#include "truth/metrics.h"
 #include "volumes.h"
 
 enum { EDGE = 24, COUNT = EDGE * EDGE, PARTS = 96 };
@@ -17,14 +18,6 @@ static const double VOXEL = 0.02;
 
 static double positions[3 * COUNT];
 static float normals[3 * COUNT];
-
-static void place_receivers(void) {
-    for (size_t i = 0; i < COUNT; ++i) {
-        positions[3 * i] = -2.0 + 4.0 * ((double)(i % EDGE) + 0.5) / EDGE;
-        positions[3 * i + 2] = -2.0 + 4.0 * ((double)(i / EDGE) + 0.5) / EDGE;
-        normals[3 * i + 1] = 1.0f;
-    }
-}
 
 static vsh_light panel(const double centre[3], const double u[3], const double v[3]) {
     vsh_light light = vsh_light_default();
@@ -111,25 +104,9 @@ static void shade(const vsh_occluders *occluders, const vsh_light *light, int32_
     shade_points(occluders, &points, light, &options, NULL, values, deviation);
 }
 
-typedef struct difference {
-    double root_mean_square, largest, bias;
-} difference;
-
-static difference compare(const float *values, const double *truth) {
-    difference d = {0.0, 0.0, 0.0};
+static void find_truth(const vsh_light *light, float truth[COUNT]) {
     for (size_t i = 0; i < COUNT; ++i) {
-        const double off = (double)values[i] - truth[i];
-        d.root_mean_square += off * off / COUNT;
-        d.bias += off / COUNT;
-        d.largest = fmax(d.largest, fabs(off));
-    }
-    d.root_mean_square = sqrt(d.root_mean_square);
-    return d;
-}
-
-static void find_truth(const vsh_light *light, double truth[COUNT]) {
-    for (size_t i = 0; i < COUNT; ++i) {
-        truth[i] = look(light, positions + 3 * i, normals + 3 * i, true, NULL);
+        truth[i] = (float)look(light, positions + 3 * i, normals + 3 * i, true, NULL);
     }
 }
 
@@ -140,14 +117,13 @@ TEST(rays_of_every_kind_match_brute_force) {
     static const int32_t METHODS[] = {VSH_SHADOW_RAYS, VSH_SHADOW_ADAPTIVE, VSH_SHADOW_EXACT};
     static const double MOST[3][LIGHTS] = {
         {0.01, 0.01, 0.035, 0.01, 0.02}, {0.012, 0.012, 0.035, 0.012, 0.02}, {0.01, 0.01, 0.01, 0.01, 0.01}};
-    double truth[COUNT];
-    float values[COUNT], said[COUNT];
+    float values[COUNT], said[COUNT], truth[COUNT];
     for (int l = 0; l < LIGHTS; ++l) {
         const vsh_light light = light_of(l);
         double darkest = 1.0;
         find_truth(&light, truth);
         for (size_t i = 0; i < COUNT; ++i) {
-            darkest = fmin(darkest, truth[i]);
+            darkest = fmin(darkest, (double)truth[i]);
         }
         assert_true(darkest < 0.35);
         for (size_t m = 0; m < (c->triangles != NULL ? 3 : 2); ++m) {
@@ -156,21 +132,19 @@ TEST(rays_of_every_kind_match_brute_force) {
             for (size_t i = 0; i < COUNT; ++i) {
                 square += (double)said[i] * (double)said[i] / COUNT;
             }
-            const difference d = compare(values, truth);
+            const truth_metrics d = truth_compare(COUNT, values, truth, NULL);
             const bool exact = METHODS[m] == VSH_SHADOW_EXACT;
-            assert_that(
-                d.root_mean_square < MOST[m][l] &&
-                    (!exact || (fabs(d.bias) < 0.001 && d.root_mean_square < 1.1 * sqrt(square) + 1e-3)),
-                "light %d, %s: off by %g, %g is said, on average %g, at most %g", l,
-                vsh_get_name(VSH_NAMES_SHADOW, METHODS[m]), d.root_mean_square, sqrt(square), d.bias,
-                d.largest);
+            assert_that(d.rmse < MOST[m][l] &&
+                            (!exact || (fabs(d.bias) < 0.001 && d.rmse < 1.1 * sqrt(square) + 1e-3)),
+                        "light %d, %s: off by %g, %g is said, on average %g, at most %g", l,
+                        vsh_get_name(VSH_NAMES_SHADOW, METHODS[m]), d.rmse, sqrt(square), d.bias, d.max);
         }
         if (c->triangles != NULL) {
             assert_ok(vshi_trace_shadow(c->triangles, NULL, COUNT, positions, normals, 0.0, &light, 4096,
                                         NULL, values, &failure));
-            const difference d = compare(values, truth);
-            assert_that(d.root_mean_square < 0.003 && d.largest < 0.02,
-                        "light %d, traced: off by %g, at most %g", l, d.root_mean_square, d.largest);
+            const truth_metrics d = truth_compare(COUNT, values, truth, NULL);
+            assert_that(d.rmse < 0.003 && d.max < 0.02, "light %d, traced: off by %g, at most %g", l, d.rmse,
+                        d.max);
         }
     }
 }
@@ -178,16 +152,15 @@ TEST(rays_of_every_kind_match_brute_force) {
 /* As near as one disc can be to two thirds as high as wide, and one edge to a table's corners. */
 TEST(one_march_takes_the_disc_of_equal_solid_angle) {
     const casting *c = *state;
-    double truth[COUNT];
-    float values[COUNT];
+    float values[COUNT], truth[COUNT];
     for (int l = 0; l < 2; ++l) {
         const vsh_light light = light_of(l);
         find_truth(&light, truth);
         for (int32_t method = VSH_SHADOW_SMOOTH; method <= VSH_SHADOW_CONE; ++method) {
             shade(occluders_of_caster(c), &light, method, values, NULL);
-            const difference d = compare(values, truth);
-            assert_that(d.root_mean_square < 0.12, "light %d, %s: off by %g", l,
-                        vsh_get_name(VSH_NAMES_SHADOW, method), d.root_mean_square);
+            const truth_metrics d = truth_compare(COUNT, values, truth, NULL);
+            assert_that(d.rmse < 0.12, "light %d, %s: off by %g", l, vsh_get_name(VSH_NAMES_SHADOW, method),
+                        d.rmse);
         }
     }
     /* far away a square is a ball */
@@ -372,7 +345,7 @@ TEST(irradiance_has_the_cosine_of_the_rectangles_side) {
 
 static int set_up(void **state) {
     static casting c;
-    place_receivers();
+    put_square(EDGE, 2.0, 0.0, positions, normals);
     c = caster_of(SCENE, VOXEL, 3.0);
     *state = &c;
     return 0;

@@ -14,20 +14,6 @@ static const double NOWHERE[3] = {0.0, 0.0, 0.0};
 static double positions[3 * COUNT];
 static float normals[3 * COUNT];
 
-/* Floor texels, and every third point in the air or inside a solid with any normal. */
-static void fill_points(void) {
-    uint64_t counter = 21;
-    floor_texels(SIDE, positions, normals);
-    for (size_t i = 0; i < COUNT; i += 3) {
-        double n[3];
-        random_direction(&counter, n);
-        for (size_t axis = 0; axis < 3; ++axis) {
-            positions[3 * i + axis] = axis == 1 ? between(&counter, -1.0, 3.0) : between(&counter, -4.0, 4.0);
-            normals[3 * i + axis] = (float)n[axis];
-        }
-    }
-}
-
 /* Every kind of value at the points: shadows of a sun and of a lamp by each method, and AO. `scale` is that
  * of all lengths; the lights are given in the scene's own axes through `turn` (rows) and moved by `by`. */
 
@@ -116,7 +102,7 @@ static void assert_same_field(const vsh_field *a, const vsh_field *b) {
 /* From 1e-10 to 1e10 of the voxel: the field's values are voxels, and only they are shaded. */
 TEST(scaled_by_a_power_of_two_every_bit_stays) {
     static values still, scaled;
-    fill_points();
+    scattered_texels(SIDE, 21, positions, normals);
     FREED_BY(caster_free) casting c = caster_of_moved(truth_seeds(), 0.03125, 1.0, NOWHERE, 8.0);
     shade_all(&c, &STILL, &still);
     const int exponents[] = {-34, -20, -10, 3, 20, 40, 44};
@@ -139,28 +125,15 @@ TEST(scaled_by_a_power_of_two_every_bit_stays) {
 
 /* A box and a pyramid without its base, of floats that any power of two scales exactly. */
 static vsh_grid *grid_of_meshes(double scale, double half_width, bool open) {
-    static const float box[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
-                                    {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
-    static const uint32_t sides[12][3] = {{0, 2, 1}, {0, 3, 2}, {4, 5, 6}, {4, 6, 7}, {0, 1, 5}, {0, 5, 4},
-                                          {3, 6, 2}, {3, 7, 6}, {0, 4, 7}, {0, 7, 3}, {1, 2, 6}, {1, 6, 5}};
-    static const float roof[5][3] = {
-        {-0.7f, 1.3f, -0.8f}, {0.9f, 1.4f, -0.6f}, {0.8f, 1.3f, 0.7f}, {-0.9f, 1.2f, 0.6f}, {0.1f, 2, 0.05f}};
+    static const float roof[15] = {-0.7f, 1.3f,  -0.8f, 0.9f, 1.4f, -0.6f, 0.8f, 1.3f,
+                                   0.7f,  -0.9f, 1.2f,  0.6f, 0.1f, 2,     0.05f};
     static const uint32_t slopes[4][3] = {{0, 4, 1}, {1, 4, 2}, {2, 4, 3}, {3, 4, 0}};
-    float p[8][3], q[5][3];
-    for (int i = 0; i < 24; ++i) {
-        (&p[0][0])[i] = (float)scale * (&box[0][0])[i];
-        (&q[0][0])[i % 15] = (float)scale * (&roof[0][0])[i % 15];
+    float p[24], q[15];
+    for (int i = 0; i < 15; ++i) {
+        q[i] = (float)scale * roof[i];
     }
-    const vsh_mesh meshes[2] = {{.name = "box",
-                                 .positions = &p[0][0],
-                                 .indices = &sides[0][0],
-                                 .vertex_count = 8,
-                                 .triangle_count = 12},
-                                {.name = "roof",
-                                 .positions = &q[0][0],
-                                 .indices = &slopes[0][0],
-                                 .vertex_count = 5,
-                                 .triangle_count = 4}};
+    const double low[3] = {-scale, -scale, -scale}, high[3] = {scale, scale, scale};
+    const vsh_mesh meshes[2] = {box_mesh(p, low, high), mesh_of_arrays("roof", q, NULL, 5, slopes[0], 4)};
     vsh_grid_options options = with_voxel(0.0625 * scale);
     options.half_width = half_width;
     vsh_grid *grid = NULL;
@@ -217,7 +190,7 @@ TEST(meshes_and_unions_scaled_by_a_power_of_two_keep_every_bit) {
  * places of few digits, so that moving rounds nothing. */
 static apart apart_when_moved(const double voxels[3]) {
     static values still, there;
-    fill_points();
+    scattered_texels(SIDE, 21, positions, normals);
     for (size_t i = 0; i < 3 * COUNT; ++i) {
         positions[i] = ldexp(round(ldexp(positions[i], 20)), -20);
     }
@@ -271,7 +244,7 @@ static casting caster_of_turned(const motion *m, double voxel) {
 TEST(turned_by_right_angles_and_mirrored_values_stay_within_a_bound) {
     static values still, there;
     static const int orders[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
-    fill_points();
+    scattered_texels(SIDE, 21, positions, normals);
     FREED_BY(caster_free) casting c = caster_of_turned(&STILL, 0.04);
     shade_all(&c, &STILL, &still);
     apart worst[VALUES] = {{0.0, 0.0, 0}};
@@ -444,8 +417,7 @@ TEST(a_growing_slab_hides_more) {
     double at[3 * PLACES];
     float ns[3 * PLACES];
     for (int i = 0; i < PLACES; ++i) {
-        memcpy(at + 3 * i, (const double[]){0.09 * i, -1.5, 0.05 * i}, sizeof(double[3]));
-        memcpy(ns + 3 * i, (const float[]){0.0f, 1.0f, 0.0f}, sizeof(float[3]));
+        put_point(at, ns, (size_t)i, 0.09 * i, -1.5, 0.05 * i);
     }
     bool begun = false;
     for (double half = 0.05; half < 1.2; half += 0.3 * voxel) {

@@ -173,7 +173,7 @@ static float floor_light(const vsh_field *field, const vsh_light *light, const d
     const vsh_points points = {1, at, up, NULL};
     float open = -1.0f;
     const vsh_shade_options shade = preview_options();
-    shade_ao_points(occluders_of(field), &points, &shade, NULL, &open);
+    shade_ao_points(occluders_of(field), &points, &shade, NULL, &open, NULL);
     return open;
 }
 
@@ -420,9 +420,8 @@ TEST(fog_in_the_sun_shines_and_in_shadow_does_not) {
 /* --- lightmaps */
 
 static vsh_mesh quad(void) {
-    static const float positions[] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0},
-                       uvs[] = {0, 0, 1, 0, 1, 1, 0, 1};
-    return quad_mesh("quad", positions, uvs);
+    static const float positions[] = {-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+    return quad_mesh("quad", positions, QUAD_UVS);
 }
 
 /* Texel centres at (i + ½) / N, row 0 at v = 1. */

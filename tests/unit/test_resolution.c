@@ -1,18 +1,12 @@
 /* Resolutions where the user gives none, and casters without voxels. */
-#include "fields.h"
 #include "scenes.h"
+#include "shading.h"
 #include "testing.h"
 
 enum { POINTS = 400 };
 
-/* A plate of 2 × 2, 0.2 thick, whose top is at y = 1. */
-static vsh_mesh plate(void) {
-    static float corners[24];
-    return box_mesh(corners, (const double[]){-1.0, 0.8, -1.0}, (const double[]){1.0, 1.0, 1.0});
-}
-
 static vsh_occluders *plate_of(int32_t resolution) {
-    const vsh_mesh mesh = plate();
+    const vsh_mesh mesh = plate_mesh();
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = resolution;
     vsh_occluders *made = NULL;
@@ -24,11 +18,8 @@ static vsh_occluders *plate_of(int32_t resolution) {
 static void scatter(double positions[POINTS][3], float normals[POINTS][3]) {
     uint64_t counter = 3;
     for (int i = 0; i < POINTS; ++i) {
-        positions[i][0] = between(&counter, -2, 2);
-        positions[i][1] = between(&counter, -1, 0.7);
-        positions[i][2] = between(&counter, -2, 2);
-        normals[i][0] = normals[i][2] = 0.0f;
-        normals[i][1] = 1.0f;
+        const double x = between(&counter, -2, 2), y = between(&counter, -1, 0.7);
+        put_point(positions[0], normals[0], (size_t)i, x, y, between(&counter, -2, 2));
     }
 }
 
@@ -48,8 +39,7 @@ static double error_of(const float lit[POINTS], const float truth[POINTS]) {
 
 TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
     OWNED(vsh_occluders) *made = plate_of(0);
-    vsh_occluders_info info;
-    vsh_occluders_get_info(made, &info);
+    const vsh_occluders_info info = occluders_info(made);
     assert_true(info.voxel_size == 0.0 && info.field_bytes == 0 && info.levels == 0 && info.has_triangles);
     double positions[POINTS][3];
     float normals[POINTS][3], lit[POINTS], truth[POINTS];
@@ -111,8 +101,7 @@ TEST(methods_that_need_voxels_are_refused_without_them) {
     const vshi_occluder_parts parts = parts_of(made);
     vsh_field_sample(parts.field, 1, at, &value);
     assert_true(isnan(value));
-    OWNED(vsh_query) *query = NULL;
-    assert_ok(vsh_query_create(made, &light, 1, NULL, &query, &failure));
+    OWNED(vsh_query) *query = query_of(made, &light, 1, NULL);
     vsh_query_output output = vsh_query_output_default();
     output.distance = &value;
     assert_int_equal(vsh_query_points(query, &points, NULL, NULL, &output, NULL, &failure),
@@ -133,8 +122,7 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     OWNED(vsh_occluders) *made = NULL;
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     assert_ok(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &failure));
-    vsh_occluders_info info;
-    vsh_occluders_get_info(made, &info);
+    const vsh_occluders_info info = occluders_info(made);
     assert_int_equal(info.layer_count, layered ? 1 : 0);
     double positions[POINTS][3];
     float normals[POINTS][3];

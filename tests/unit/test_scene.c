@@ -1,6 +1,7 @@
 /* Scenes: what their keys become, and which scenes are refused: wrong, damaged, too large, not there. */
 #include "base/error.h"
 #include "fields.h"
+#include "folder.h"
 #include "io/reader/reader.h"
 #include "scenes.h"
 #include "shade/shade.h"
@@ -229,10 +230,10 @@ TEST(a_rectangle_has_its_sides) {
 
 TEST(every_example_in_the_scene_reference_is_valid) {
     static const char start[] = "```json\n", end[] = "\n```";
-    size_t size;
-    FREED char *text = read_text(VSH_ASSETS "/../docs/scene.md", &size);
+    FREED unsigned char *bytes = NULL;
+    read_all(VSH_ASSETS "/../docs/scene.md", &bytes);
     size_t count = 0;
-    for (char *at = text; (at = strstr(at, start)) != NULL; ++count) {
+    for (char *at = (char *)bytes; (at = strstr(at, start)) != NULL; ++count) {
         at += sizeof start - 1;
         char *stop = strstr(at, end);
         assert_non_null(stop);
@@ -498,8 +499,9 @@ TEST(bytes_of_zero_are_refused_with_their_place) {
 }
 
 TEST(a_seeds_scene_cut_anywhere_is_an_error) {
-    size_t size;
-    FREED char *text = read_text(seeds_path, &size);
+    FREED unsigned char *bytes = NULL;
+    read_all(seeds_path, &bytes);
+    char *text = (char *)bytes;
     const size_t end = (size_t)(strrchr(text, '}') - text);
     for (size_t cut = 0; cut <= end; ++cut) {
         FREED char *piece =
@@ -612,10 +614,9 @@ TEST(bytes_that_are_no_text_do_not_reach_messages) {
 }
 
 TEST(files_that_cannot_be_read_are_refused) {
-    char large[] = "scene-XXXXXX";
-    const int file = mkstemp(large);
-    assert_true(file >= 0 && ftruncate(file, (off_t)1 << 36) == 0);
-    close(file);
+    const char *large = at("large.json");
+    write_string(large, "");
+    assert_int_equal(truncate(large, (off_t)1 << 36), 0);
     const struct {
         const char *path;
         vsh_result code;
@@ -632,26 +633,18 @@ TEST(files_that_cannot_be_read_are_refused) {
         assert_null(made);
         assert_non_null(strstr(failure.message, files[i].message));
     }
-    unlink(large);
 }
 
 /* --- the memory of reading a scene's text is known before it is read */
 
-/* A folder of this run's own: the sanitizers' build runs beside this one in the same working folder. */
-static char folder[] = "/tmp/vdbshade-scene-memory-XXXXXX";
-static char file[sizeof folder + sizeof "/memory.json"];
-
 /* An array of `count` times a piece, which is also written to the file. */
 static char *write_scene(const char *piece, size_t count) {
-    char *text = malloc(count * (strlen(piece) + 1) + 3), *at = text;
+    char *text = malloc(count * (strlen(piece) + 1) + 3), *end = text;
     for (size_t i = 0; i < count; ++i) {
-        at = stpcpy(stpcpy(at, i == 0 ? "[" : ","), piece);
+        end = stpcpy(stpcpy(end, i == 0 ? "[" : ","), piece);
     }
-    strcpy(at, "]");
-    FILE *out = fopen(file, "wb");
-    assert_non_null(out);
-    assert_true(fputs(text, out) >= 0);
-    assert_int_equal(fclose(out), 0);
+    strcpy(end, "]");
+    write_string(at("memory.json"), text);
     return text;
 }
 
@@ -663,10 +656,10 @@ static size_t taken(void) {
 static bool passes(size_t limit) {
     vsh_run run = run_within(limit);
     OWNED(vsh_scene) *scene = NULL;
-    const vsh_result result = vsh_scene_read(file, &run, &scene, &failure);
+    const vsh_result result = vsh_scene_read(at("memory.json"), &run, &scene, &failure);
     assert_true(result != VSH_ERROR_LIMIT || strstr(failure.message, "memory.json") != NULL);
     OWNED(vsh_flat_scene) *flat = NULL;
-    assert_true((vsh_flat_scene_read(file, &run, &flat, NULL) == VSH_ERROR_LIMIT) ==
+    assert_true((vsh_flat_scene_read(at("memory.json"), &run, &flat, NULL) == VSH_ERROR_LIMIT) ==
                 (result == VSH_ERROR_LIMIT));
     return result != VSH_ERROR_LIMIT;
 }
@@ -716,17 +709,6 @@ TEST(a_bomb_is_refused_before_it_is_read) {
     const size_t before = taken();
     assert_false(passes((size_t)50 << 20));
     assert_true(taken() <= before + 65536);
-}
-
-static int make_folder(void **state) {
-    const bool made = mkdtemp(folder) != NULL;
-    snprintf(file, sizeof file, "%s/memory.json", folder);
-    return made ? 0 : -1;
-}
-
-static int remove_folder(void **state) {
-    unlink(file);
-    return rmdir(folder);
 }
 
 FIXTURE(make_folder, remove_folder)

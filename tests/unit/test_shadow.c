@@ -43,8 +43,7 @@ TEST(the_seeds_floor_is_as_near_to_the_truth_as_promised) {
         const vsh_shade_stats stats =
             shadows(field, &light, cases[i].method, FINEST, positions, normals, visible);
         const truth_metrics m = truth_compare(FINEST, visible, truth, NULL);
-        truth_metrics_print(vsh_get_name(VSH_NAMES_SHADOW, cases[i].method), &m);
-        assert_true(m.rmse <= cases[i].rmse);
+        assert_at_most(m.rmse, cases[i].rmse);
         assert_true(stats.unfinished == 0 && stats.invalid == 0 && stats.beyond_reach == 0);
     }
 }
@@ -367,20 +366,6 @@ TEST(the_horizon_cuts_the_light_like_a_straight_edge) {
 
 /* --- how shadows are computed: work that is counted, and bad input */
 
-/* Floor texels, points in the air and inside solids, with normals all around. */
-static void fill_points(void) {
-    uint64_t counter = 9;
-    floor_texels(SIDE, positions, normals);
-    for (size_t i = 0; i < COUNT; i += 3) {
-        double n[3];
-        random_direction(&counter, n);
-        for (size_t axis = 0; axis < 3; ++axis) {
-            positions[3 * i + axis] = axis == 1 ? between(&counter, -1.0, 3.0) : between(&counter, -4.0, 4.0);
-            normals[3 * i + axis] = (float)n[axis];
-        }
-    }
-}
-
 static vsh_result shade(const vsh_field *field, const vsh_light *light, const vsh_shade_options *options,
                         const vsh_run *run, float *values, vsh_shade_stats *stats) {
     const vsh_points points = {COUNT, positions, normals, NULL};
@@ -389,7 +374,7 @@ static vsh_result shade(const vsh_field *field, const vsh_light *light, const vs
 
 TEST(every_point_is_marched_skipped_certified_or_invalid) {
     static float visible[COUNT];
-    fill_points();
+    scattered_texels(SIDE, 9, positions, normals);
     positions[0] = (double)NAN;
     OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
     const vsh_light light = sun(truth_seeds_sun, 0.2);

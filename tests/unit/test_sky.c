@@ -1,6 +1,7 @@
 /* The channel `sky`: what of an even sky is seen, however far the casters, against form factors. */
 #include "shading.h"
 #include "testing.h"
+#include "truth/metrics.h"
 
 enum { BOXES = 5, SIDE = 48, COUNT = SIDE * SIDE };
 
@@ -28,11 +29,8 @@ static void make_triangles(stage *s, size_t count) {
         }
         meshes[i] = box_mesh(corners[i], low, high);
     }
-    assert_ok(vshi_triangles_create(meshes, count, NULL, &s->triangles, &failure));
+    s->triangles = triangles_from(meshes, count);
 }
-
-static const float FLAT[8] = {0, 0, 1, 0, 1, 1, 0, 1};
-static const uint32_t QUAD[6] = {0, 1, 2, 0, 2, 3};
 
 static vsh_lightmap_options sizes_of(int32_t spacing) {
     vsh_lightmap_options options = vsh_lightmap_options_default();
@@ -49,16 +47,10 @@ static void receive(stage *s, const double origin[3], const double u[3], const d
         s->corners[6 + axis] = (float)(origin[axis] + u[axis] + v[axis]);
         s->corners[9 + axis] = (float)(origin[axis] + v[axis]);
     }
-    s->mesh = (vsh_mesh){.name = "receiver",
-                         .positions = s->corners,
-                         .uvs = FLAT,
-                         .indices = QUAD,
-                         .vertex_count = 4,
-                         .triangle_count = 2};
+    s->mesh = quad_mesh("receiver", s->corners, QUAD_UVS);
     const vsh_lightmap_options options = sizes_of(spacing);
     vsh_charts_free(s->charts);
-    s->charts = NULL;
-    assert_ok(vsh_charts_create(&s->mesh, 1, &options, NULL, NULL, &s->charts, &failure));
+    s->charts = charts_from(&s->mesh, 1, &options);
 }
 
 static void receive_floor(stage *s, int32_t spacing) {
@@ -127,24 +119,20 @@ static void check_floor(double half_x, double half_z, int32_t spacing, double bi
     receive_floor(s, spacing);
     for (int m = s->triangles != NULL ? 0 : 1; m < 2; ++m) {
         bake_well(s, methods[m], VSH_UP_Y);
-        double square = 0.0, mean = 0.0;
-        size_t count = 0;
+        static float truth[COUNT];
         for (size_t i = 0; i < COUNT; ++i) {
             const double x = s->half[0] * (2.0 * ((double)(i % SIDE) + 0.5) / SIDE - 1.0);
             const double z = s->half[1] * (2.0 * ((double)(i / SIDE) + 0.5) / SIDE - 1.0);
-            const double off = (double)s->sky[i] - opening(s, x, z);
-            count += s->coverage[i] > 0.0f;
-            square += s->coverage[i] > 0.0f ? off * off : 0.0;
-            mean += s->coverage[i] > 0.0f ? off : 0.0;
+            truth[i] = (float)opening(s, x, z);
         }
-        const double n = (double)count, rmse = sqrt(square / n);
-        const double said = vsh_bake_error_rmse(&s->errors[1]);
+        const truth_metrics off = truth_compare(COUNT, s->sky, truth, s->coverage);
+        const double said = vsh_bake_error_rmse(&s->errors[1]), count = (double)off.count;
         assert_true(count > COUNT * 8 / 10);
-        assert_true(rmse < 0.02 && said < 0.02);
-        assert_true(methods[m] != VSH_AO_EXACT || fabs(mean / n) < bias);
-        assert_true(s->errors[0].values == 0.0 && s->errors[1].values == (double)count);
+        assert_true(off.rmse < 0.02 && said < 0.02);
+        assert_true(methods[m] != VSH_AO_EXACT || fabs(off.bias) < bias);
+        assert_true(s->errors[0].values == 0.0 && s->errors[1].values == count);
         if (s->triangles != NULL) {
-            assert_true(s->errors[1].held == (double)count && said > 0.8 * rmse);
+            assert_true(s->errors[1].held == count && said > 0.8 * off.rmse);
         }
     }
 }

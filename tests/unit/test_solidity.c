@@ -1,12 +1,45 @@
 /* Components are solids or sheets. The part that they enclose is compared with winding numbers, which these
  * tests sum over all triangles. */
-#include "kinds.h"
-#include "testing.h"
-
 #include "geometry/edges.h"
+#include "geometry/solidity.h"
 #include "shade/shade.h"
+#include "shapes.h"
+#include "testing.h"
 #include "trace/embree.h"
 #include "traced.h"
+
+OWNER(vshi_solidity)
+
+static vshi_solidity *solidity_of(const vsh_mesh *meshes, size_t count) {
+    vshi_solidity *made = NULL;
+    assert_ok(vshi_solidity_create(meshes, count, NULL, &made, &failure));
+    return made;
+}
+
+/* The kinds of all components in their order: "S" solid, "R" room, "W" wall, "-" sheet. */
+static void assert_kinds(const vsh_mesh *meshes, size_t count, const char *kinds) {
+    OWNED(vshi_solidity) *s = solidity_of(meshes, count);
+    char found[32] = "";
+    for (size_t i = 0; i < s->count && i + 1 < sizeof found; ++i) {
+        found[i] = "-SRW"[s->components[i].kind];
+    }
+    assert_that(strcmp(found, kinds) == 0, "%s: %s, expected %s (encloses %g)", meshes->name, found, kinds,
+                s->components[0].enclosed);
+}
+
+static void assert_kinds_of(shape *s, const char *what, const char *kinds) {
+    const vsh_mesh mesh = shape_mesh(s, what);
+    assert_kinds(&mesh, 1, kinds);
+    s->vertices = s->triangles = 0;
+}
+
+/* All triangles of a mesh have this side. */
+static void assert_sides(const vshi_solidity *s, size_t mesh, const vsh_mesh *of, uint8_t side) {
+    const uint8_t *sides = vshi_solidity_sides(s, mesh);
+    for (size_t i = 0; i < of->triangle_count; ++i) {
+        assert_that(sides[i] == side, "%s: triangle %zu: side %d, expected %d", of->name, i, sides[i], side);
+    }
+}
 
 static const double ORIGIN[3] = {0, 0, 0};
 static const double LOW[3] = {-1, -1, -1}, HIGH[3] = {1, 1, 1};
@@ -458,19 +491,10 @@ TEST(an_open_room_in_an_open_house_closes_neither) {
 
 /* --- Shadow and AO where solids are closed over holes, and in rooms. */
 
-static casting caster_of_mesh(const vsh_mesh *mesh, double voxel) {
-    const vsh_grid_options options = with_voxel(voxel);
-    vsh_grid *grid = NULL;
-    vshi_triangles *triangles = NULL;
-    assert_ok(vsh_grid_from_meshes(mesh, 1, &options, NULL, &grid, &failure));
-    assert_ok(vshi_triangles_create(mesh, 1, NULL, &triangles, &failure));
-    return (casting){field_of_grid(grid, 0.0), triangles};
-}
-
 /* From 8 × 8 places `step` apart that look along z, which are proved together. */
 static void assert_all_see(const vsh_mesh *mesh, double voxel, const double towards[3], const double first[3],
                            const double step[2]) {
-    FREED_BY(caster_free) casting c = caster_of_mesh(mesh, voxel);
+    FREED_BY(caster_free) casting c = caster_of_meshes(mesh, 1, voxel, 0.0);
     const vsh_light narrow = sun(towards, RADIANS(1.0));
     double at[3 * 64];
     float up[3 * 64] = {0.0f}, seen[64];
@@ -511,7 +535,7 @@ TEST(the_floor_of_an_inward_room_has_the_ao_of_a_room) {
     shape_box(s, LOW, HIGH, ALL_SIDES);
     shape_turn(s, 0);
     const vsh_mesh mesh = shape_mesh(s, "room");
-    FREED_BY(caster_free) casting c = caster_of_mesh(&mesh, 0.02);
+    FREED_BY(caster_free) casting c = caster_of_meshes(&mesh, 1, 0.02, 0.0);
     const double at[6] = {0.013, 0.021, -1.0, 0.9, 0.0, -1.0};
     const float up[6] = {0, 0, 1, 0, 0, 1};
     for (int32_t method = 0; method < AO_METHODS; ++method) {
@@ -532,8 +556,7 @@ static const double CUP[][2] = {{0, 0}, {1, 0}, {1, 2}};
 
 /* Whether points that look up are hidden among the triangles of a mesh. */
 static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t count, bool hidden) {
-    OWNED(vshi_triangles) *triangles = NULL;
-    assert_ok(vshi_triangles_create(mesh, 1, NULL, &triangles, &failure));
+    OWNED(vshi_triangles) *triangles = triangles_from(mesh, 1);
     for (size_t i = 0; i < count; ++i) {
         uint8_t where;
         vshi_inside(triangles, 1, at[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);

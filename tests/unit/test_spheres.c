@@ -1,4 +1,5 @@
 /* Spheres that cast by themselves, against analytic rays. */
+#include "folder.h"
 #include "shading.h"
 #include "testing.h"
 #include "truth/analytic.h"
@@ -209,14 +210,8 @@ TEST(bad_spheres_are_refused_by_number) {
 }
 
 static vsh_result read_text(const char *text, double **spheres, size_t *count, vsh_error *error) {
-    char path[] = "spheres-XXXXXX";
-    const int file = mkstemp(path);
-    assert_true(file >= 0);
-    assert_true(write(file, text, strlen(text)) == (ssize_t)strlen(text));
-    close(file);
-    const vsh_result result = vshi_spheres_read(path, NULL, spheres, count, error);
-    unlink(path);
-    return result;
+    write_string(at("spheres.csv"), text);
+    return vshi_spheres_read(at("spheres.csv"), NULL, spheres, count, error);
 }
 
 TEST(rows_of_a_file_are_read_or_refused_by_number) {
@@ -254,3 +249,5 @@ TEST(rows_of_a_file_are_read_or_refused_by_number) {
     assert_int_equal(vshi_spheres_read("no such file.csv", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
     assert_int_equal(vshi_spheres_read(".", NULL, &spheres, &count, &failure), VSH_ERROR_READ);
 }
+
+FIXTURE(make_folder, remove_folder)

@@ -257,11 +257,7 @@ TEST(surface_keeps_the_limit_and_ends_when_asked) {
     vsh_field *field = NULL;
     vsh_run run = vsh_run_default();
     OWNED(vsh_field) *plain = field_of(truth_seeds(), VOXEL, 1.0);
-    vsh_field_info info;
-    vsh_grid_info voxels;
-    vsh_field_get_info(plain, &info);
-    vsh_grid_get_info(grid, &voxels);
-    run.memory_limit = 2 * (info.bytes + voxels.bytes);
+    run.memory_limit = 2 * (field_info(plain).bytes + grid_info(grid).bytes);
     assert_fails(make(grid, &run, &field, &failure), VSH_ERROR_LIMIT, "surface");
     assert_null(field);
 }

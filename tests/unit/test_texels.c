@@ -13,7 +13,8 @@ typedef struct sampled {
 
 static sampled sample(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
                       vsh_uv_report *reports) {
-    sampled s = {.charts = create(meshes, count, options, reports)};
+    sampled s = {.charts = NULL};
+    assert_ok(vsh_charts_create(meshes, count, &options, NULL, reports, &s.charts, &failure));
     vsh_charts_get_info(s.charts, &s.info);
     s.texels = texels_from(s.charts);
     s.samples = samples_of(s.texels);
@@ -22,8 +23,7 @@ static sampled sample(const vsh_mesh *meshes, size_t count, vsh_lightmap_options
 
 /* One triangle, whose corners are 0, 1 and 2. */
 static vsh_mesh triangle_mesh(const float positions[9], const float uvs[6]) {
-    return (vsh_mesh){
-        .positions = positions, .uvs = uvs, .indices = QUAD_INDICES, .vertex_count = 3, .triangle_count = 1};
+    return mesh_of_arrays(NULL, positions, uvs, 3, QUAD_INDICES, 1);
 }
 
 static void free_sampled(sampled *s) {
@@ -98,12 +98,7 @@ TEST(triangles_that_share_edges_and_corners_leave_no_gap_and_no_overlap) {
             positions[3 * k] = uvs[2 * k];
             positions[3 * k + 1] = uvs[2 * k + 1];
         }
-        const vsh_mesh mesh = {.name = "fan",
-                               .positions = positions,
-                               .uvs = uvs,
-                               .indices = indices,
-                               .vertex_count = SPOKES + 1,
-                               .triangle_count = SPOKES};
+        const vsh_mesh mesh = mesh_of_arrays("fan", positions, uvs, SPOKES + 1, indices, SPOKES);
         vsh_uv_report report;
         FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(16, 16, 3), &report);
         assert_int_equal(made.info.samples, 16 * 16 * 9);
@@ -194,8 +189,7 @@ TEST(triangles_without_area_are_skipped_and_counted_in_uv_space) {
     const float uvs[] = {0, 0, 1, 0, 0, 1, 0.5f, 0.5f};
     /* A good one; no area in the world; no area in UV space (corners 1, 2 and 3 lie on a line there). */
     const uint32_t indices[] = {0, 1, 2, 0, 1, 3, 1, 3, 2, 0, 0, 0};
-    const vsh_mesh mesh = {
-        .positions = positions, .uvs = uvs, .indices = indices, .vertex_count = 4, .triangle_count = 4};
+    const vsh_mesh mesh = mesh_of_arrays(NULL, positions, uvs, 4, indices, 4);
     vsh_uv_report report;
     FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(8, 8, 1), &report);
     assert_int_equal(report.degenerate_triangles, 1);
@@ -353,8 +347,7 @@ TEST(normals_that_are_flat_or_broken_lift_nothing) {
 
 TEST(a_cube_with_averaged_normals_is_shaded_smooth_but_stays_in_its_place) {
     const float positions[] = {-1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1}; /* one face; normals of the corners */
-    const float uvs[] = {0, 0, 1, 0, 1, 1, 0, 1};
-    vsh_mesh mesh = quad_mesh("face", positions, uvs);
+    vsh_mesh mesh = quad_mesh("face", positions, QUAD_UVS);
     mesh.normals = positions;
     FREED_BY(free_sampled) sampled made = sample(&mesh, 1, size_of(16, 16, 1), NULL);
     for (size_t i = 0; i < made.samples.count; ++i) {

@@ -21,40 +21,23 @@ typedef struct block {
     double centre[3], half[3];
 } block;
 
-/* Rodrigues' rotation about (1, 2, 3). */
-static void turn_by(double turn, const double v[3], double out[3]) {
-    const double norm = sqrt(14.0), a[3] = {1.0 / norm, 2.0 / norm, 3.0 / norm};
-    const double c = cos(turn), s = sin(turn), along = dot3(a, v);
-    for (int axis = 0; axis < 3; ++axis) {
-        const int j = (axis + 1) % 3, k = (axis + 2) % 3;
-        out[axis] = c * v[axis] + s * (a[j] * v[k] - a[k] * v[j]) + (1.0 - c) * along * a[axis];
-    }
-}
+static const double AXIS[3] = {1.0, 2.0, 3.0};
 
 /* The same as triangles. */
 static vshi_triangles *triangles_of_blocks(const block *blocks, int count, double turn, const double by[3]) {
     vsh_mesh meshes[8];
     float corners[8][24];
     double transforms[8][12];
-    vshi_triangles *triangles = NULL;
     for (int i = 0; i < count; ++i) {
         const double *h = blocks[i].half, low[3] = {-h[0], -h[1], -h[2]};
         double centre[3];
         meshes[i] = box_mesh(corners[i], low, h);
-        turn_by(turn, blocks[i].centre, centre);
-        for (int axis = 0; axis < 3; ++axis) {
-            const double unit[3] = {axis == 0, axis == 1, axis == 2};
-            double column[3];
-            turn_by(turn, unit, column);
-            for (int row = 0; row < 3; ++row) {
-                transforms[i][4 * row + axis] = column[row];
-            }
-            transforms[i][4 * axis + 3] = centre[axis] + by[axis];
-        }
+        turn_about(AXIS, turn, blocks[i].centre, centre);
+        go_along(centre, 1.0, by, centre);
+        make_turn(AXIS, turn, centre, transforms[i]);
         meshes[i].transform = transforms[i];
     }
-    assert_ok(vshi_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure));
-    return triangles;
+    return triangles_from(meshes, (size_t)count);
 }
 
 /* The union of boxes, turned about (1, 2, 3) by `turn` radians and then moved. No field where there is
@@ -64,23 +47,17 @@ static casting caster_of_blocks(const block *blocks, int count, double turn, con
     int last = 0;
     for (int i = 0; i < count; ++i) {
         const int at = i == 0 ? 0 : last + 1;
-        nodes[at] = vsh_sdf_node_default();
-        nodes[at].shape = VSH_SDF_BOX;
-        memcpy(nodes[at].size, blocks[i].half, sizeof blocks[i].half);
+        nodes[at] = box_node(blocks[i].half[0], blocks[i].half[1], blocks[i].half[2]);
         memcpy(nodes[at].translation, blocks[i].centre, sizeof blocks[i].centre);
         if (i > 0) {
-            nodes[at + 1] = vsh_sdf_node_default();
-            nodes[at + 1].shape = VSH_SDF_UNION;
-            nodes[at + 1].left = last;
-            nodes[at + 1].right = at;
+            nodes[at + 1] = operation_node(VSH_SDF_UNION, last, at);
         }
         last = i == 0 ? 0 : at + 1;
     }
     vsh_sdf_node *root = &nodes[last];
     assert_true(count > 1 || length3(root->translation) == 0.0); /* a lone box is moved by `by` only */
-    const double norm = sqrt(14.0);
     for (int axis = 0; axis < 3; ++axis) {
-        root->rotation[axis] = sin(0.5 * turn) * (axis + 1) / norm;
+        root->rotation[axis] = sin(0.5 * turn) * AXIS[axis] / length3(AXIS);
         root->translation[axis] = by[axis];
     }
     root->rotation[3] = cos(0.5 * turn);
@@ -133,8 +110,8 @@ static passage pass(const block *blocks, int count, const double low[3], const d
                 }
                 const double up[3] = {tilt * between(&counter, -1.0, 1.0), 1.0,
                                       tilt * between(&counter, -1.0, 1.0)};
-                turn_by(turn, p, q);
-                turn_by(turn, up, d);
+                turn_about(AXIS, turn, p, q);
+                turn_about(AXIS, turn, up, d);
                 go_along(q, 1.0, by, q);
                 const vsh_light point = sun(d, 0.0), narrow = sun(d, NARROW * VOXEL);
                 through += cast_shadow_at(&c, &point, VSH_SHADOW_HARD, q, NULL) == 1.0f;
@@ -250,13 +227,7 @@ static casting caster_of_boxes(const double (*corners)[2][3], int count, double 
     for (int i = 0; i < count; ++i) {
         meshes[i] = box_mesh(places[i], corners[i][0], corners[i][1]);
     }
-    const vsh_grid_options options = with_voxel(voxel);
-    vsh_grid *grid = NULL;
-    vshi_triangles *triangles = NULL;
-    assert_that(vsh_grid_from_meshes(meshes, (size_t)count, &options, NULL, &grid, &failure) == VSH_OK &&
-                    vshi_triangles_create(meshes, (size_t)count, NULL, &triangles, &failure) == VSH_OK,
-                "%s", failure.message);
-    return (casting){field_of_grid(grid, 0.0), triangles};
+    return caster_of_meshes(meshes, (size_t)count, voxel, 0.0);
 }
 
 /* The lightest value in the umbra of the boxes, straight under them. */

@@ -23,9 +23,7 @@ static void free_casters(casters *c) {
 }
 
 static casters casters_of_mesh(const vsh_mesh *meshes, size_t count) {
-    casters c = {NULL, NULL};
-    assert_ok(vshi_triangles_create(meshes, count, NULL, &c.triangles, &failure));
-    return c;
+    return (casters){triangles_from(meshes, count), NULL};
 }
 
 /* Solids of one tree under a transform (NULL: none). */
@@ -78,10 +76,7 @@ static vsh_mesh ball(double x, double y, double z) {
         const uint32_t corners[6] = {a, b, a + SECTORS, b, b + SECTORS, a + SECTORS};
         memcpy(indices + 6 * a, corners, sizeof corners);
     }
-    return (vsh_mesh){.positions = positions,
-                      .indices = indices,
-                      .vertex_count = (RINGS + 1) * SECTORS,
-                      .triangle_count = 2 * RINGS * SECTORS};
+    return mesh_of_arrays(NULL, positions, NULL, (RINGS + 1) * SECTORS, indices, 2 * RINGS * SECTORS);
 }
 
 static casters casters_of_ball(double x, double y, double z) {
@@ -99,13 +94,6 @@ static vsh_sdf_node shape_at(int32_t shape, double x, double y, double z) {
 static vsh_sdf_node box_at(double x, double y, double z, double a, double b, double c) {
     vsh_sdf_node node = shape_at(VSH_SDF_BOX, x, y, z);
     memcpy(node.size, (const double[]){a, b, c}, sizeof node.size);
-    return node;
-}
-
-static vsh_sdf_node operation(int32_t shape) {
-    vsh_sdf_node node = shape_at(shape, 0.0, 0.0, 0.0);
-    node.left = 0;
-    node.right = 1;
     return node;
 }
 
@@ -141,7 +129,8 @@ TEST(the_receivers_own_horizon_is_an_edge) {
 
 TEST(a_hole_in_a_slab_lets_its_share_of_the_disc_through) {
     vsh_sdf_node nodes[3] = {box_at(0.0, 3.0, 0.0, 20.0, 0.5, 20.0),
-                             shape_at(VSH_SDF_CYLINDER, 0.0, 3.0, 0.0), operation(VSH_SDF_SUBTRACTION)};
+                             shape_at(VSH_SDF_CYLINDER, 0.0, 3.0, 0.0),
+                             operation_node(VSH_SDF_SUBTRACTION, 0, 1)};
     nodes[1].size[1] = 2.0;
     nodes[1].radius = 0.35;
     FREED_BY(free_casters) casters c = casters_of_tree(nodes, 3, NULL);
@@ -255,7 +244,7 @@ TEST(a_ray_is_hidden_that_meets_either_solids_or_triangles) {
 
 static casters box_and(int32_t shape, int32_t how, const double *transform) {
     vsh_sdf_node nodes[3] = {box_at(0.3, 2.0, 0.1, 0.5, 0.2, 0.4), shape_at(shape, -0.5, 2.5, 0.3),
-                             operation(how)};
+                             operation_node(how, 0, 1)};
     nodes[2].smoothing = 0.3;
     nodes[2].rotation[1] = how == VSH_SDF_UNION ? 0.5 : 0.0;
     return casters_of_tree(nodes, 3, transform);
@@ -451,7 +440,7 @@ TEST(bad_triangles_and_calls_are_refused) {
     assert_fails(vshi_triangles_create(&mesh, 1, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
     const uint32_t wrong[3] = {0, 1, 99};
     const float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
-    const vsh_mesh bad = {.positions = corners, .indices = wrong, .vertex_count = 3, .triangle_count = 1};
+    const vsh_mesh bad = mesh_of_arrays(NULL, corners, NULL, 3, wrong, 1);
     assert_fails(vshi_triangles_create(&bad, 1, NULL, &triangles, &failure), VSH_ERROR_INPUT, "");
     assert_null(triangles);
 

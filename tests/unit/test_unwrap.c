@@ -107,7 +107,7 @@ TEST(shapes_have_few_charts_of_little_stretch) {
         assert_that(info.charts >= shapes[i].least && info.charts <= shapes[i].most &&
                         info.stretch <= shapes[i].stretch && info.worst_stretch <= shapes[i].worst &&
                         info.covered >= shapes[i].covered,
-                    "%s: %u charts, stretch %g, at worst %g, %g covered", mesh.name, info.charts,
+                    "%s: %u charts, stretch %g, at worst %g, %g covered", mesh.name, (unsigned)info.charts,
                     info.stretch, info.worst_stretch, info.covered);
     }
 }
@@ -683,12 +683,7 @@ static vsh_mesh with_uvs(const vsh_mesh *mesh, const vsh_atlas *atlas, float **p
         memcpy(*positions + 3 * v, mesh->positions + 3 * (size_t)m.sources[v], 3 * sizeof(float));
     }
     memcpy(*uvs, m.uvs, m.vertex_count * 2 * sizeof(float));
-    return (vsh_mesh){.name = mesh->name,
-                      .positions = *positions,
-                      .uvs = *uvs,
-                      .indices = m.indices,
-                      .vertex_count = m.vertex_count,
-                      .triangle_count = m.triangle_count};
+    return mesh_of_arrays(mesh->name, *positions, *uvs, m.vertex_count, m.indices, m.triangle_count);
 }
 
 static int32_t can_serve(const vsh_mesh *mesh) {
@@ -831,15 +826,8 @@ TEST(bad_meshes_are_refused) {
 
 /* A rectangle of 1 × 2 units that fills the square: along v a texel is twice as long as along u. */
 TEST(density_and_stretch_follow_from_the_derivatives_of_uvs) {
-    static const float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 2, 0}, {0, 2, 0}};
-    static const float uvs[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
-    vsh_mesh mesh = {.name = "rectangle",
-                     .positions = positions[0],
-                     .uvs = uvs[0],
-                     .indices = indices,
-                     .vertex_count = 4,
-                     .triangle_count = 2};
+    static const float positions[12] = {0, 0, 0, 1, 0, 0, 1, 2, 0, 0, 2, 0};
+    vsh_mesh mesh = quad_mesh("rectangle", positions, QUAD_UVS);
     vsh_uvs_measures measures;
     assert_ok(vsh_uvs_measure(&mesh, 64, 64, &measures, &failure));
     assert_true(fabs(measures.texels_per_unit - 64.0 / sqrt(2.0)) < 1e-9);

@@ -4,7 +4,7 @@
 #include "directions.h"
 #include "embree.h"
 #include "handles.h"
-#include "testing.h"
+#include "shapes.h"
 
 OWNER(truth_mesh)
 
@@ -16,68 +16,48 @@ typedef struct box {
     double low[3], high[3];
 } box;
 
-/* Quads in one mesh, each with a square of its own in a grid of charts. */
-typedef struct shape {
-    float positions[12 * MOST_QUADS], uvs[8 * MOST_QUADS];
-    uint32_t indices[6 * MOST_QUADS];
-    size_t quads;
+/* Quads, each with a square of its own in a grid of charts. */
+typedef struct yard {
+    shape shape;
+    float uvs[8 * MOST_QUADS];
     box boxes[MOST_BOXES]; /* the solids among them */
     size_t box_count;
-} shape;
+} yard;
 
-static void add_quad(shape *s, const double corners[4][3]) {
-    assert_true(s->quads < MOST_QUADS);
-    for (size_t k = 0; k < 4; ++k) {
-        for (size_t axis = 0; axis < 3; ++axis) {
-            s->positions[12 * s->quads + 3 * k + axis] = (float)corners[k][axis];
-        }
-    }
-    for (size_t k = 0; k < 6; ++k) {
-        s->indices[6 * s->quads + k] = (uint32_t)(4 * s->quads) + QUAD_INDICES[k];
-    }
-    ++s->quads;
-}
-
-/* `inwards` turns its faces: a room. */
-static void add_faces(shape *s, box b, bool inwards) {
-    for (int axis = 0; axis < 3; ++axis) {
-        for (int side = 0; side < 2; ++side) {
-            const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-            double corners[4][3];
-            for (int k = 0; k < 4; ++k) {
-                const bool along = k == 1 || k == 2, across = k >= 2;
-                const bool turned = (side == 0) != inwards;
-                corners[k][axis] = side != 0 ? b.high[axis] : b.low[axis];
-                corners[k][u] = (turned ? across : along) ? b.high[u] : b.low[u];
-                corners[k][v] = (turned ? along : across) ? b.high[v] : b.low[v];
-            }
-            add_quad(s, (const double(*)[3])corners);
-        }
-    }
-}
-
-static void add_box(shape *s, box b) {
+static void add_box(yard *s, box b) {
     assert_true(s->box_count < MOST_BOXES);
     s->boxes[s->box_count++] = b;
-    add_faces(s, b, false);
+    shape_box(&s->shape, b.low, b.high, ALL_SIDES);
+}
+
+/* Its faces look inwards. */
+static void add_room(yard *s, box b) {
+    const size_t first = s->shape.vertices;
+    shape_box(&s->shape, b.low, b.high, ALL_SIDES);
+    for (size_t v = first; v < s->shape.vertices; v += 4) {
+        float kept[3];
+        memcpy(kept, s->shape.positions[v + 1], sizeof kept);
+        memcpy(s->shape.positions[v + 1], s->shape.positions[v + 3], sizeof kept);
+        memcpy(s->shape.positions[v + 3], kept, sizeof kept);
+    }
+}
+
+static size_t quads_of(const yard *s) {
+    return s->shape.triangles / 2;
 }
 
 /* A strip of charts has gaps of a fifth. */
-static vsh_mesh mesh_of(shape *s) {
-    const size_t across = (size_t)ceil(sqrt((double)s->quads));
-    for (size_t q = 0; q < s->quads; ++q) {
-        static const float corner[4][2] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-        for (size_t k = 0; k < 4; ++k) {
-            s->uvs[8 * q + 2 * k] = ((float)(q % across) + 0.1f + 0.8f * corner[k][0]) / (float)across;
-            s->uvs[8 * q + 2 * k + 1] = ((float)(q / across) + 0.1f + 0.8f * corner[k][1]) / (float)across;
-        }
+static vsh_mesh mesh_of(yard *s) {
+    const size_t across = (size_t)ceil(sqrt((double)quads_of(s)));
+    assert_true(quads_of(s) <= MOST_QUADS);
+    for (size_t i = 0; i < 4 * quads_of(s); ++i) {
+        const float *corner = QUAD_UVS + 2 * (i % 4);
+        s->uvs[2 * i] = ((float)(i / 4 % across) + 0.1f + 0.8f * corner[0]) / (float)across;
+        s->uvs[2 * i + 1] = ((float)(i / 4 / across) + 0.1f + 0.8f * corner[1]) / (float)across;
     }
-    return (vsh_mesh){.name = "shape",
-                      .positions = s->positions,
-                      .uvs = s->uvs,
-                      .indices = s->indices,
-                      .vertex_count = 4 * s->quads,
-                      .triangle_count = 2 * s->quads};
+    vsh_mesh mesh = shape_mesh(&s->shape, "yard");
+    mesh.uvs = s->uvs;
+    return mesh;
 }
 
 /* A lightmap of AO, and what is behind it. */
@@ -107,7 +87,7 @@ static baked bake(const vsh_mesh *mesh, int32_t resolution, double distance) {
     options.shade.ao_method = VSH_AO_EXACT;
     options.shade.ao_distance = distance;
     options.shade.rays = 16;
-    assert_ok(vsh_charts_create(mesh, 1, &options, NULL, NULL, &b.charts, &failure));
+    b.charts = charts_from(mesh, 1, &options);
     b.texels = texels_from(b.charts);
     b.samples = samples_of(b.texels);
     b.ao = calloc(SIZE * SIZE, sizeof *b.ao);
@@ -129,7 +109,7 @@ static bool is_valid(const baked *b, size_t i) {
 }
 
 /* How deep a point is in the deepest of the boxes. */
-static double depth_in(const shape *s, const double p[3]) {
+static double depth_in(const yard *s, const double p[3]) {
     double deepest = -INFINITY;
     for (size_t i = 0; i < s->box_count; ++i) {
         double depth = INFINITY;
@@ -142,7 +122,7 @@ static double depth_in(const shape *s, const double p[3]) {
 }
 
 /* How deep the boxes hold what is a hair above a sample. */
-static double depth_above(const shape *s, const baked *b, size_t i) {
+static double depth_above(const yard *s, const baked *b, size_t i) {
     const float *n = b->samples.geometric_normals + 3 * i;
     double above[3];
     go_along(b->samples.positions + 3 * i, 1e-3, (const double[]){n[0], n[1], n[2]}, above);
@@ -153,13 +133,13 @@ static float ao_of(const baked *b, size_t i) {
     return b->ao[vsh_texel_place(b->samples.texels[i], SIZE)];
 }
 
-static baked bake_shape(shape *s, int32_t resolution, double distance) {
+static baked bake_yard(yard *s, int32_t resolution, double distance) {
     const vsh_mesh mesh = mesh_of(s);
     return bake(&mesh, resolution, distance);
 }
 
 /* Samples whose validity is not that of the boxes, a hair above the surface. */
-static size_t count_wrong(const shape *s, const baked *b) {
+static size_t count_wrong(const yard *s, const baked *b) {
     size_t wrong = 0;
     for (size_t i = 0; i < b->samples.count; ++i) {
         const double depth = depth_above(s, b, i);
@@ -170,8 +150,8 @@ static size_t count_wrong(const shape *s, const baked *b) {
 
 /* A floor; boxes that stand on it, in it and in each other; pickets; and rivets a quarter of a voxel of 1/64
  * proud of a wall. */
-static shape *new_yard(void) {
-    shape *s = calloc(1, sizeof *s);
+static yard *new_yard(void) {
+    yard *s = calloc(1, sizeof *s);
     add_box(s, (box){{-4.0, -0.5, -4.0}, {4.0, 0.0, 4.0}});
     add_box(s, (box){{-1.03, 0.0, -1.07}, {0.21, 1.3, 0.4}});
     add_box(s, (box){{1.0, -0.1, 1.0}, {2.03, 1.0, 2.1}});
@@ -189,12 +169,12 @@ static shape *new_yard(void) {
 }
 
 TEST(samples_in_solids_are_invalid_and_no_others_at_every_voxel_size) {
-    FREED shape *yard = new_yard();
+    FREED yard *busy = new_yard();
     static const int32_t RESOLUTIONS[3] = {32, 64, 256};
     uint64_t invalid[3];
     for (int r = 0; r < 3; ++r) {
-        FREED_BY(free_baked) baked b = bake_shape(yard, RESOLUTIONS[r], 1.0);
-        assert_int_equal(count_wrong(yard, &b), 0);
+        FREED_BY(free_baked) baked b = bake_yard(busy, RESOLUTIONS[r], 1.0);
+        assert_int_equal(count_wrong(busy, &b), 0);
         invalid[r] = b.stats.invalid_texels;
     }
     assert_true(invalid[0] > 1000);
@@ -203,11 +183,11 @@ TEST(samples_in_solids_are_invalid_and_no_others_at_every_voxel_size) {
 }
 
 TEST(a_room_of_inward_faces_is_valid_but_where_things_stand) {
-    FREED shape *s = calloc(1, sizeof *s);
-    add_faces(s, (box){{-3.0, 0.0, -3.0}, {3.0, 2.5, 3.0}}, true);
+    FREED yard *s = calloc(1, sizeof *s);
+    add_room(s, (box){{-3.0, 0.0, -3.0}, {3.0, 2.5, 3.0}});
     add_box(s, (box){{-1.0, 0.0, -1.0}, {0.5, 0.8, 0.5}});
     add_box(s, (box){{1.0, 1.0, 2.5}, {1.5, 1.6, 3.5}}); /* through a wall */
-    FREED_BY(free_baked) baked b = bake_shape(s, 48, 1.0);
+    FREED_BY(free_baked) baked b = bake_yard(s, 48, 1.0);
     size_t wrong = 0, behind = 0;
     for (size_t i = 0; i < b.samples.count; ++i) {
         const double *p = b.samples.positions + 3 * i, depth = depth_above(s, &b, i);
@@ -220,17 +200,17 @@ TEST(a_room_of_inward_faces_is_valid_but_where_things_stand) {
     assert_int_equal(wrong, 0);
 }
 
-static void quad_at(shape *s, double y, double low, double high) {
+static void quad_at(yard *s, double y, double low, double high) {
     const double corners[4][3] = {{low, y, high}, {high, y, high}, {high, y, low}, {low, y, low}};
-    add_quad(s, corners);
+    shape_quad_at(&s->shape, corners);
 }
 
 TEST(decals_and_a_floor_under_cloth_are_valid) {
-    FREED shape *s = calloc(1, sizeof *s);
+    FREED yard *s = calloc(1, sizeof *s);
     add_box(s, (box){{-4.0, -0.5, -4.0}, {4.0, 0.0, 4.0}});
     quad_at(s, 1e-4, -1.0, 0.0); /* the decal */
     quad_at(s, 0.3, 1.0, 3.0);   /* the cloth */
-    FREED_BY(free_baked) baked b = bake_shape(s, 32, 1.0);
+    FREED_BY(free_baked) baked b = bake_yard(s, 32, 1.0);
     size_t decal = 0, cloth = 0;
     for (size_t i = 0; i < b.samples.count; ++i) {
         const double *p = b.samples.positions + 3 * i;
@@ -246,7 +226,7 @@ TEST(decals_and_a_floor_under_cloth_are_valid) {
 }
 
 /* Adds a sphere around a place, without its quads nearer than `hole` to the +z axis; the angle in radians. */
-static void add_sphere(shape *s, double radius, double z, double hole) {
+static void add_sphere(yard *s, double radius, double z, double hole) {
     enum { RINGS = 24, SECTORS = 32 };
     for (int ring = 0; ring < RINGS; ++ring) {
         const double a0 = hole + (PI - hole) * ring / RINGS, a1 = hole + (PI - hole) * (ring + 1) / RINGS;
@@ -260,22 +240,22 @@ static void add_sphere(shape *s, double radius, double z, double hole) {
                 corners[k][1] = across * sin(b);
                 corners[k][2] = z + radius * cos(a);
             }
-            add_quad(s, (const double(*)[3])corners);
+            shape_quad_at(&s->shape, (const double(*)[3])corners);
         }
     }
 }
 
 TEST(an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen) {
-    FREED shape *s = calloc(1, sizeof *s);
+    FREED yard *s = calloc(1, sizeof *s);
     add_sphere(s, 1.0, 0.0, 0.35);
     add_sphere(s, 0.4, 0.5, 0.0);
     static const int32_t RESOLUTIONS[2] = {32, 128};
     for (int r = 0; r < 2; ++r) {
-        FREED_BY(free_baked) baked b = bake_shape(s, RESOLUTIONS[r], 0.5);
+        FREED_BY(free_baked) baked b = bake_yard(s, RESOLUTIONS[r], 0.5);
         size_t head = 0, front = 0, back = 0;
         for (size_t i = 0; i < b.samples.count; ++i) {
             const double *p = b.samples.positions + 3 * i;
-            if (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] > 0.95) {
+            if (dot3(p, p) > 0.95) {
                 ++head;
                 assert_true(is_valid(&b, i));
             } else if (p[2] > 0.87) { /* up to the edge of the hole, close before which it lies */
@@ -291,22 +271,22 @@ TEST(an_eye_in_a_head_with_a_hole_is_valid_where_it_is_seen) {
 }
 
 TEST(flipped_faces_invalidate_no_others) {
-    FREED shape *s = calloc(1, sizeof *s);
+    FREED yard *s = calloc(1, sizeof *s);
     add_box(s, (box){{-1.0, -1.0, -1.0}, {1.0, 1.0, 1.0}});
     add_box(s, (box){{1.5, -1.0, -1.0}, {2.5, 1.0, 1.0}});
     for (size_t q = 0; q < 12; q += 5) {
-        uint32_t *index = s->indices + 6 * q;
+        uint32_t *index = s->shape.indices[2 * q];
         const uint32_t turned[6] = {index[0], index[2], index[1], index[3], index[5], index[4]};
         memcpy(index, turned, sizeof turned);
     }
-    FREED_BY(free_baked) baked b = bake_shape(s, 32, 1.0);
+    FREED_BY(free_baked) baked b = bake_yard(s, 32, 1.0);
     for (size_t i = 0; i < b.samples.count; ++i) {
         assert_true(depth_above(s, &b, i) >= 0.0 || is_valid(&b, i));
     }
 }
 
 TEST(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far) {
-    FREED shape *s = calloc(1, sizeof *s);
+    FREED yard *s = calloc(1, sizeof *s);
     add_box(s, (box){{-4.0, -4.0, -4.0}, {4.0, 4.0, 4.0}});
     add_box(s, (box){{-0.01, 4.0, -0.01}, {0.01, 5.0, 0.01}}); /* less than a voxel thick */
     const vsh_mesh mesh = mesh_of(s);
@@ -324,13 +304,13 @@ TEST(points_deep_in_a_box_see_no_sky_though_its_triangles_are_far) {
 
 /* A floor of one chart with a box on it, as wide as `half`: its texels under the box. */
 TEST(invalid_texels_take_the_nearest_value_of_their_chart) {
-    FREED shape *s = calloc(1, sizeof *s);
+    FREED yard *s = calloc(1, sizeof *s);
     quad_at(s, 0.0, -4.0, 4.0);
     add_box(s, (box){{-1.5, -0.2, -1.5}, {1.5, 1.0, 1.5}});
     vsh_mesh mesh = mesh_of(s);
     const float floor[8] = {0, 0, 1, 0, 1, 0.9f, 0, 0.9f}; /* but for the topmost tenth */
     memcpy(s->uvs, floor, sizeof floor);
-    for (size_t i = 8; i < 8 * s->quads; i += 2) {
+    for (size_t i = 8; i < 8 * quads_of(s); i += 2) {
         s->uvs[i + 1] = 0.92f + 0.07f * s->uvs[i + 1];
     }
     FREED_BY(free_baked) baked b = bake(&mesh, 32, 1.0);
@@ -355,10 +335,10 @@ TEST(invalid_texels_take_the_nearest_value_of_their_chart) {
 TEST(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid) {
     static const double GAPS[2] = {6e-6, 0.0};
     for (int k = 0; k < 2; ++k) {
-        FREED shape *s = calloc(1, sizeof *s);
+        FREED yard *s = calloc(1, sizeof *s);
         add_box(s, (box){{-2.0, -1.0, -2.0}, {2.0, 0.0, 2.0}});
         add_box(s, (box){{-1.0, GAPS[k], -1.0}, {1.0, 1.0, 1.0}});
-        FREED_BY(free_baked) baked b = bake_shape(s, 32, 1.0);
+        FREED_BY(free_baked) baked b = bake_yard(s, 32, 1.0);
         size_t between = 0, valid = 0;
         for (size_t i = 0; i < b.samples.count; ++i) {
             const double *p = b.samples.positions + 3 * i;
@@ -375,9 +355,9 @@ TEST(a_gap_that_is_narrower_than_the_lift_of_rays_is_no_solid) {
 /* A quarter of a bent pipe, open at both ends, whose faces look inwards; one end a little over a floor. Some
  * rays from beside it go into it, most do not. */
 TEST(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid) {
-    enum { AROUND = 24, ALONG = 16, TOP = 3 };
+    enum { AROUND = 24, ALONG = 16, FLOOR_TOP = 3 };
     static const double BEND = 0.6, RADIUS = 0.15;
-    FREED shape *s = calloc(1, sizeof *s);
+    FREED yard *s = calloc(1, sizeof *s);
     add_box(s, (box){{-0.4, -0.1, -1.0}, {0.4, 0.0, 0.4}});
     for (int k = 0; k < AROUND * ALONG; ++k) {
         double corners[4][3];
@@ -389,14 +369,14 @@ TEST(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid) {
             corners[c][1] = 0.02 + r * sin(a);
             corners[c][2] = -r * cos(a);
         }
-        add_quad(s, (const double(*)[3])corners);
+        shape_quad_at(&s->shape, (const double(*)[3])corners);
     }
     const vsh_mesh mesh = mesh_of(s);
-    for (size_t k = 0; k < 4 * s->quads; ++k) { /* the floor's top has most of the lightmap */
+    for (size_t k = 0; k < 4 * quads_of(s); ++k) { /* the floor's top has most of the lightmap */
         s->uvs[2 * k + 1] = 0.9f + 0.1f * s->uvs[2 * k + 1];
     }
     const float top[8] = {0.0f, 0.0f, 1.0f, 0.0f, 1.0f, 0.9f, 0.0f, 0.9f};
-    memcpy(s->uvs + 8 * TOP, top, sizeof top);
+    memcpy(s->uvs + 8 * FLOOR_TOP, top, sizeof top);
     FREED_BY(free_baked) baked b = bake(&mesh, 32, 1.0);
     size_t beside = 0, wrong = 0;
     for (size_t i = 0; i < b.samples.count; ++i) {
@@ -411,7 +391,7 @@ TEST(a_floor_beside_the_mouth_of_an_inward_pipe_is_valid) {
 }
 
 /* A floor and a box that stands on it. */
-static void put_box_on_floor(shape *s, double low, double high) {
+static void put_box_on_floor(yard *s, double low, double high) {
     memset(s, 0, sizeof *s);
     quad_at(s, 0.0, -4.0, 4.0);
     add_box(s, (box){{low, 0.0, low}, {high, 1.0, high}});
@@ -434,12 +414,12 @@ static double find_centre(const baked *b, double x) {
 }
 
 TEST(texels_on_the_side_of_a_box_are_filled_from_the_open) {
-    FREED shape *s = malloc(sizeof *s);
+    FREED yard *s = malloc(sizeof *s);
     put_box_on_floor(s, -1.0, 1.0);
-    FREED_BY(free_baked) baked any = bake_shape(s, 64, 1.0);
+    FREED_BY(free_baked) baked any = bake_yard(s, 64, 1.0);
     const double low = find_centre(&any, -0.8), high = find_centre(&any, 1.2);
     put_box_on_floor(s, low, high);
-    FREED_BY(free_baked) baked b = bake_shape(s, 64, 1.0);
+    FREED_BY(free_baked) baked b = bake_yard(s, 64, 1.0);
     size_t touching = 0;
     for (size_t i = 0; i < b.samples.count; ++i) {
         const double *p = b.samples.positions + 3 * i;
@@ -456,9 +436,9 @@ TEST(texels_on_the_side_of_a_box_are_filled_from_the_open) {
 /* The room's floor is a wall with air behind it, so nothing is met from beneath it. */
 TEST(undersides_on_a_floor_with_air_beneath_it_are_invalid) {
     for (int kind = 0; kind < 3; ++kind) { /* on a plane, in a room, in a mirrored room */
-        FREED shape *s = calloc(1, sizeof *s);
+        FREED yard *s = calloc(1, sizeof *s);
         if (kind > 0) {
-            add_faces(s, (box){{-4.0, 0.0, -4.0}, {4.0, 2.5, 4.0}}, true);
+            add_room(s, (box){{-4.0, 0.0, -4.0}, {4.0, 2.5, 4.0}});
         } else {
             quad_at(s, 0.0, -4.0, 4.0);
         }
@@ -508,10 +488,10 @@ static double number(size_t i, double irrational) {
 }
 
 /* Sets point i of `p`: a place on quad q, which is a rectangle. */
-static void place_on_quad(const shape *s, size_t q, double across, double along, points *p, size_t i) {
+static void place_on_quad(const yard *s, size_t q, double across, double along, points *p, size_t i) {
     double edge[2][3], g[3];
     for (size_t k = 0; k < 3; ++k) {
-        const float *corner = s->positions + 12 * q + k;
+        const float *corner = s->shape.positions[4 * q] + k;
         edge[0][k] = (double)(corner[3] - corner[0]);
         edge[1][k] = (double)(corner[9] - corner[0]);
         p->at[3 * i + k] = (double)corner[0] + across * edge[0][k] + along * edge[1][k];
@@ -519,7 +499,7 @@ static void place_on_quad(const shape *s, size_t q, double across, double along,
     for (size_t k = 0; k < 3; ++k) {
         g[k] = edge[0][(k + 1) % 3] * edge[1][(k + 2) % 3] - edge[0][(k + 2) % 3] * edge[1][(k + 1) % 3];
     }
-    const double area = sqrt(g[0] * g[0] + g[1] * g[1] + g[2] * g[2]);
+    const double area = length3(g);
     for (size_t k = 0; k < 3; ++k) {
         p->normal[3 * i + k] = (float)(g[k] / area);
         p->at[3 * i + k] += LIFT * g[k] / area;
@@ -530,11 +510,11 @@ static void place_on_quad(const shape *s, size_t q, double across, double along,
     }
 }
 
-static points *place_points(const shape *s) {
+static points *place_points(const yard *s) {
     points *p = calloc(1, sizeof *p);
     double area[MOST_QUADS], sum = 0.0;
-    for (size_t q = 0; q < s->quads; ++q) {
-        const float *c = s->positions + 12 * q;
+    for (size_t q = 0; q < quads_of(s); ++q) {
+        const float *c = s->shape.positions[4 * q];
         area[q] = sum += hypot(hypot((double)(c[3] - c[0]), (double)(c[4] - c[1])), (double)(c[5] - c[2])) *
                          hypot(hypot((double)(c[9] - c[0]), (double)(c[10] - c[1])), (double)(c[11] - c[2]));
     }
@@ -570,13 +550,12 @@ static void trace_points(const vsh_mesh *mesh, points *p) {
 
 static void bake_planes(const vsh_mesh *mesh, float *ao, float *shadow) {
     OWNED(vsh_occluders) *occluders = trace_mesh(mesh, 0);
-    OWNED(vsh_charts) *charts = NULL;
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = options.height = TEXELS;
     options.shade.ao_distance = AO_DISTANCE;
     options.shade.max_error = 0.005;
     options.shade.rays = 1024;
-    assert_ok(vsh_charts_create(mesh, 1, &options, NULL, NULL, &charts, &failure));
+    OWNED(vsh_charts) *charts = charts_from(mesh, 1, &options);
     vsh_light sun = vsh_light_default();
     memcpy(sun.direction, SUN, sizeof SUN);
     sun.angle = SUN_ANGLE;
@@ -608,13 +587,13 @@ TEST(rooms_are_not_seen_darker_along_corners) {
     /* Its lower sides pass through centres of the floor's texels. */
     static const box CHEST = {{-0.46, 0, -0.46}, {0.46, 0.83, 0.39}};
     for (int open = 0; open < 2; ++open) {
-        FREED shape *s = calloc(1, sizeof *s);
+        FREED yard *s = calloc(1, sizeof *s);
         FREED float *planes = calloc(2 * TEXELS * TEXELS, sizeof *planes);
-        add_faces(s, CHEST, false);
-        add_faces(s, ROOM, true);
+        shape_box(&s->shape, CHEST.low, CHEST.high, ALL_SIDES);
+        add_room(s, ROOM);
         if (open) { /* the fourth of the room's quads is its ceiling: the last takes its place */
-            memcpy(s->positions + 12 * 9, s->positions + 12 * 11, 12 * sizeof *s->positions);
-            --s->quads;
+            memcpy(s->shape.positions[4 * 9], s->shape.positions[4 * 11], 4 * sizeof *s->shape.positions);
+            s->shape.triangles -= 2;
         }
         const vsh_mesh mesh = mesh_of(s);
         FREED points *p = place_points(s);

@@ -88,8 +88,7 @@ enum { LIGHTS = 2 };
 /* Shadow at places by a query. */
 static float *query_shadow(const vsh_occluders *occluders, const vsh_light *light,
                            const vsh_shade_options *options, size_t count, const double *places) {
-    OWNED(vsh_query) *query = NULL;
-    assert_ok(vsh_query_create(occluders, light, 1, options, &query, &failure));
+    OWNED(vsh_query) *query = query_of(occluders, light, 1, options);
     float *values = malloc(count * sizeof *values), *const visibility[1] = {values};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
@@ -185,8 +184,7 @@ TEST(layers_hide_light_and_are_solid) {
         }
         inside += two[i] < -0.1f && two[i] > -0.2f;
     }
-    vsh_volume_info info;
-    vsh_volume_get_info(volume, &info);
+    const vsh_volume_info info = volume_info(volume);
     assert_true(different < d.count / 50 && behind > 50 && inside > 10 && near > 50);
     assert_true(info.shaded + info.filled + info.off == d.count && info.filled > 500);
 }
@@ -212,11 +210,10 @@ TEST(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet) {
 
     const float low = (float)(-half - 0.5 * voxel), high = (float)(half - 0.5 * voxel);
     const float positions[12] = {low, 0, high, high, 0, high, high, 0, low, low, 0, low};
-    static const float uvs[8] = {0, 0, 1, 0, 1, 1, 0, 1};
-    const vsh_mesh floor = quad_mesh("floor", positions, uvs);
+    const vsh_mesh floor = quad_mesh("floor", positions, QUAD_UVS);
     vsh_lightmap_options lightmap = size_of(SIDE, SIDE, 1);
     lightmap.ao_spacing = 1;
-    OWNED(vsh_charts) *charts = create(&floor, 1, lightmap, NULL);
+    OWNED(vsh_charts) *charts = charts_from(&floor, 1, &lightmap);
     static float shadow[TEXELS], ao[TEXELS], coverage[TEXELS];
     float *const shadows_of[1] = {shadow};
     const vsh_lightmap planes = {.shadow = shadows_of, .ao = ao, .coverage = coverage};
@@ -298,8 +295,7 @@ TEST(casters_without_voxels_hide_light_and_are_solid) {
         in_sphere += within;
         in_heights += buried;
     }
-    vsh_volume_info info;
-    vsh_volume_get_info(volume, &info);
+    const vsh_volume_info info = volume_info(volume);
     assert_true(outside > 10000 && shaded_by_sphere > 100 && in_sphere > 500 && in_heights > 3000);
     assert_true(info.filled + info.off > in_ball + in_sphere + in_heights);
 }

@@ -165,7 +165,7 @@ static inline vsh_run run_watched(vsh_progress_fn *progress, void *user) {
  *     OWNED(vsh_field) *field = field_of(…);    by vshi_field_free(field)
  *     FREED float *values = malloc(…);          by free(values)
  *     FREED_BY(free_baked) baked b = bake(…);   by free_baked(&b) */
-#define FREED_BY(function) __attribute__((cleanup(function)))
+#define FREED_BY(function) __attribute__((cleanup(function), unused))
 #define FREED FREED_BY(free_memory)
 #define OWNED(type) FREED_BY(type##_release) type
 
@@ -228,6 +228,12 @@ static inline void go_along(const double from[3], double t, const double d[3], d
     }
 }
 
+/* Returns the next of a sequence of numbers in [0, 1). */
+static inline double next_random(uint32_t *state) {
+    *state = *state * 1664525u + 1013904223u;
+    return (double)(*state >> 8) * 0x1p-24;
+}
+
 static inline void assert_all_equal(const float *values, size_t count, float expected) {
     for (size_t i = 0; i < count; ++i) {
         assert_that(values[i] == expected, "value %zu is %.9g, not %.9g", i, (double)values[i],
@@ -235,8 +241,9 @@ static inline void assert_all_equal(const float *values, size_t count, float exp
     }
 }
 
-/* Two triangles over the corners 0 … 3 of a quad. */
+/* Two triangles over the corners 0 … 3 of a quad, and UVs that fill the square. */
 static __attribute__((unused)) const uint32_t QUAD_INDICES[6] = {0, 1, 2, 0, 2, 3};
+static __attribute__((unused)) const float QUAD_UVS[8] = {0, 0, 1, 0, 1, 1, 0, 1};
 
 /* --- handles and their parts */
 
@@ -280,16 +287,22 @@ static inline vsh_grid *grid_of_tree(const vsh_sdf_node *nodes, size_t count, vs
     return grid;
 }
 
-static inline vsh_mesh quad_mesh(const char *name, const float positions[12], const float uvs[8]) {
+/* `uvs` NULL: none. */
+static inline vsh_mesh mesh_of_arrays(const char *name, const float *positions, const float *uvs,
+                                      size_t vertices, const uint32_t *indices, size_t triangles) {
     vsh_mesh mesh;
     memset(&mesh, 0, sizeof mesh);
     mesh.name = name;
     mesh.positions = positions;
     mesh.uvs = uvs;
-    mesh.indices = QUAD_INDICES;
-    mesh.vertex_count = 4;
-    mesh.triangle_count = 2;
+    mesh.indices = indices;
+    mesh.vertex_count = vertices;
+    mesh.triangle_count = triangles;
     return mesh;
+}
+
+static inline vsh_mesh quad_mesh(const char *name, const float positions[12], const float uvs[8]) {
+    return mesh_of_arrays(name, positions, uvs, 4, QUAD_INDICES, 2);
 }
 
 /* A box as a mesh of 12 triangles, which face outwards. */
@@ -299,12 +312,5 @@ static inline vsh_mesh box_mesh(float corners[24], const double low[3], const do
     for (size_t i = 0; i < 24; ++i) {
         corners[i] = (float)((i / 3) >> (i % 3) & 1 ? high[i % 3] : low[i % 3]);
     }
-    vsh_mesh mesh;
-    memset(&mesh, 0, sizeof mesh);
-    mesh.name = "box";
-    mesh.positions = corners;
-    mesh.indices = sides;
-    mesh.vertex_count = 8;
-    mesh.triangle_count = 12;
-    return mesh;
+    return mesh_of_arrays("box", corners, NULL, 8, sides, 12);
 }

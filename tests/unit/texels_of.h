@@ -13,13 +13,6 @@ static inline vsh_lightmap_options size_of(int32_t width, int32_t height, int32_
     return options;
 }
 
-static inline vsh_charts *create(const vsh_mesh *meshes, size_t count, vsh_lightmap_options options,
-                                 vsh_uv_report *reports) {
-    vsh_charts *charts = NULL;
-    assert_ok(vsh_charts_create(meshes, count, &options, NULL, reports, &charts, &failure));
-    return charts;
-}
-
 /* A quad in the plane z = 0 at x = 2 u, y = 3 v, facing +z. */
 typedef struct quad {
     float positions[12], uvs[8];
@@ -74,13 +67,8 @@ static inline void make_sphere(sphere *s, uint32_t rows, double radius) {
             i += 6;
         }
     }
-    s->mesh = (vsh_mesh){.name = "sphere",
-                         .positions = s->positions,
-                         .normals = s->normals,
-                         .uvs = s->uvs,
-                         .indices = s->indices,
-                         .vertex_count = vertices,
-                         .triangle_count = i / 3};
+    s->mesh = mesh_of_arrays("sphere", s->positions, s->uvs, vertices, s->indices, i / 3);
+    s->mesh.normals = s->normals;
 }
 
 static inline void free_sphere(sphere *s) {

@@ -74,15 +74,13 @@ static inline vsh_mesh mesh_of_solid(const truth_solid *solid) {
             }
         }
     }
-    return (vsh_mesh){
-        .positions = positions, .indices = indices, .vertex_count = vertices, .triangle_count = triangles};
+    return mesh_of_arrays(NULL, positions, NULL, vertices, indices, triangles);
 }
 
 /* The scene's triangles moved by `offset`, then scaled. */
 static inline vshi_triangles *triangles_of_moved(truth_scene scene, double scale, const double offset[3]) {
     vsh_mesh meshes[MAX_SOLIDS] = {{0}};
     double transforms[MAX_SOLIDS][12];
-    vshi_triangles *triangles = NULL;
     for (size_t i = 0; i < scene.count; ++i) {
         meshes[i] = mesh_of_solid(&scene.solids[i]);
         memset(transforms[i], 0, sizeof transforms[i]);
@@ -92,7 +90,7 @@ static inline vshi_triangles *triangles_of_moved(truth_scene scene, double scale
         }
         meshes[i].transform = transforms[i];
     }
-    assert_ok(vshi_triangles_create(meshes, scene.count, NULL, &triangles, &failure));
+    vshi_triangles *triangles = triangles_from(meshes, scene.count);
     for (size_t i = 0; i < scene.count; ++i) {
         free((void *)(uintptr_t)meshes[i].positions);
         free((void *)(uintptr_t)meshes[i].indices);
@@ -109,6 +107,11 @@ static inline casting caster_of_moved(truth_scene scene, double voxel, double sc
 static inline casting caster_of(truth_scene scene, double voxel, double reach) {
     const double nowhere[3] = {0.0, 0.0, 0.0};
     return caster_of_moved(scene, voxel, 1.0, nowhere, reach);
+}
+
+static inline casting caster_of_meshes(const vsh_mesh *meshes, size_t count, double voxel, double reach) {
+    return (casting){field_of_grid(grid_from_meshes(meshes, count, voxel), reach),
+                     triangles_from(meshes, count)};
 }
 
 static inline void caster_free(casting *c) {
@@ -135,7 +138,7 @@ static inline vsh_shade_stats cast_ao(const casting *c, int32_t method, double d
     options.ao_method = method;
     options.ao_distance = distance;
     const vsh_points points = {count, positions, normals, NULL};
-    return shade_ao_points(occluders_of_caster(c), &points, &options, NULL, open);
+    return shade_ao_points(occluders_of_caster(c), &points, &options, NULL, open, NULL);
 }
 
 static inline float cast_ao_at(const casting *c, int32_t method, double distance, const double *position,
@@ -181,7 +184,7 @@ static inline void shade_kind(const casting *c, int kind, const vsh_light *light
                               const vsh_points *points, float *values) {
     *(is_ao(kind) ? &options.ao_method : &options.method) = is_ao(kind) ? kind - SHADOW_METHODS : kind;
     if (is_ao(kind)) {
-        shade_ao_points(occluders_of_caster(c), points, &options, NULL, values);
+        shade_ao_points(occluders_of_caster(c), points, &options, NULL, values, NULL);
     } else {
         shade_points(occluders_of_caster(c), points, light, &options, NULL, values, NULL);
     }
