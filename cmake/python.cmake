@@ -15,7 +15,7 @@ set(private ${PROJECT_SOURCE_DIR}/src/bindings/bindings.h)
 set(VSH_PYTHON_FOLDER ${PROJECT_BINARY_DIR}/python/vdbshade)
 file(GLOB sources CONFIGURE_DEPENDS RELATIVE ${python}/vdbshade ${python}/vdbshade/*.py ${python}/vdbshade/py.typed)
 file(GLOB public CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/vdbshade/*.h)
-set(made ${VSH_PYTHON_FOLDER}/_abi.py ${VSH_PYTHON_FOLDER}/_tables.py ${VSH_PYTHON_FOLDER}/types.py)
+set(made ${VSH_PYTHON_FOLDER}/_abi.py ${VSH_PYTHON_FOLDER}/_version.py ${VSH_PYTHON_FOLDER}/types.py)
 add_custom_command(OUTPUT ${made}
                    COMMAND ${VSH_PYTHON_PROGRAM} ${python}/generate.py ${PROJECT_SOURCE_DIR}/include ${private} ${VSH_PYTHON_FOLDER}
                    DEPENDS ${python}/generate.py ${public} ${private}

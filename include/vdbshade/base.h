@@ -50,6 +50,8 @@
 #define VSH_API __attribute__((visibility("default")))
 #elif defined(_WIN32)
 #define VSH_API __declspec(dllimport)
+#elif defined(__GNUC__) && !defined(_WIN32)
+#define VSH_API __attribute__((visibility("default")))
 #else
 #define VSH_API
 #endif
@@ -74,8 +76,7 @@ VSH_BEGIN_C
 VSH_API const char *vsh_version(void);
 
 /* The result of a call. Every value but VSH_OK comes with a message in the caller's vsh_error. */
-typedef int32_t vsh_result;
-enum {
+typedef enum vsh_result {
     VSH_OK = 0,
     VSH_ERROR_ARGUMENT = 1,  /* a parameter or option is out of range */
     VSH_ERROR_INPUT = 2,     /* a file, mesh, grid or scene has bad content */
@@ -86,7 +87,7 @@ enum {
     VSH_ERROR_CANCELLED = 7, /* the progress callback asked to stop */
     VSH_ERROR_UNSUPPORTED = 8, /* valid input that this build does not handle */
     VSH_ERROR_INTERNAL = 9     /* a defect of this library */
-};
+} vsh_result;
 
 /* The name of a result, "VSH_ERROR_INPUT"; "VSH_ERROR_UNKNOWN" for other values. A static string. */
 VSH_API const char *vsh_result_name(vsh_result result);
@@ -120,15 +121,15 @@ typedef void vsh_warning_fn(void *user, const char *message);
 
 /* Instruction sets that the marching kernels are built for. The rest of the library has one build; Embree
  * picks its own. */
-enum {
+typedef enum vsh_isa {
     VSH_ISA_BEST = 0,  /* the best that this machine has */
     VSH_ISA_BASE = 1,  /* SSE2 on x86-64, Neon on Arm */
     VSH_ISA_AVX2 = 2,  /* x86-64 only, as the next */
     VSH_ISA_AVX512 = 3 /* F, DQ and VL */
-};
+} vsh_isa;
 
 /* Kinds of names in files and on command lines: VSH_NAMES_SHADOW are the names of VSH_SHADOW_…. */
-enum {
+typedef enum vsh_names {
     VSH_NAMES_ISA = 0,
     VSH_NAMES_SHADOW = 1,
     VSH_NAMES_AO = 2,
@@ -147,15 +148,15 @@ enum {
     VSH_NAMES_FLAT_LIGHT = 15, /* VSH_LIGHT_… in a plane: "directional", "disc", "spot" */
     VSH_NAMES_RECEIVER_UNWRAP = 16,
     VSH_NAMES_MEASURE = 17
-};
+} vsh_names;
 
 /* Returns the constant of a name: VSH_SHADOW_CONE for "cone" of VSH_NAMES_SHADOW. -1 if the name is NULL or
  * unknown, or the kind is unknown. */
-VSH_API int32_t vsh_find_name(int32_t kind, const char *name);
+VSH_API int32_t vsh_find_name(vsh_names kind, const char *name);
 
 /* Returns the name of a constant, a static string; NULL for an unknown value or kind. The values of a kind
  * are 0, 1, 2, … */
-VSH_API const char *vsh_get_name(int32_t kind, int32_t value);
+VSH_API const char *vsh_get_name(vsh_names kind, int32_t value);
 
 /* Options of every call that takes long. */
 typedef struct vsh_run {
@@ -166,11 +167,11 @@ typedef struct vsh_run {
     vsh_progress_fn *progress; /* may be NULL */
     vsh_warning_fn *warning;   /* may be NULL */
     void *user;                /* passed to both */
-    int32_t isa;        /* VSH_ISA_…, for tests; VSH_ERROR_ARGUMENT if this machine lacks it. Results do not
-                           depend on it */
-    const char *reader; /* program that parses files: VSH_READER, or one whose main calls
-                           vsh_reader_serve(), found as by execvp(). NULL: this process parses them, and a
-                           damaged file can crash it. Results do not depend on it */
+    vsh_isa isa;               /* for tests; VSH_ERROR_ARGUMENT if this machine lacks it. Results do not
+                                  depend on it */
+    const char *reader;        /* program that parses files: VSH_READER, or one whose main calls
+                                  vsh_reader_serve(), found as by execvp(). NULL: this process parses them, and a
+                                  damaged file can crash it. Results do not depend on it */
     double reader_seconds; /* time that the reader may take for one file, > 0; else VSH_ERROR_LIMIT. 0: 60,
                               plus one for each MB of the file */
     int32_t confined;      /* 1: fail with VSH_ERROR_UNSUPPORTED if the system refuses one of the reader's
@@ -230,7 +231,12 @@ VSH_API vsh_result vsh_file_digest(const char *path, const vsh_run *run, char di
 #define VSH_READER "vdbshade-reader"
 
 /* Confinements of a reader: bits. */
-enum { VSH_CONFINED_LIMITS = 1, VSH_CONFINED_CALLS = 2, VSH_CONFINED_FILES = 4, VSH_CONFINED_ALL = 7 };
+typedef enum vsh_confinement {
+    VSH_CONFINED_LIMITS = 1,
+    VSH_CONFINED_CALLS = 2,
+    VSH_CONFINED_FILES = 4,
+    VSH_CONFINED_ALL = 7
+} vsh_confinement;
 
 /* Call it first in the main of a program that is its own reader ("/proc/self/exe"), before any thread does
  * work. If argv[1] is VSH_READER_ARGUMENT, it confines the process for good, parses the file that the parent

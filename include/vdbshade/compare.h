@@ -55,7 +55,7 @@ static inline vsh_compare_options vsh_compare_options_default(void) {
 
 /* The measures, each with an upper limit. The first that fails names the fault best: a shifted bake also
  * fails most of those after it. Values are in units of the range, lengths in texels. */
-enum {
+typedef enum vsh_measure {
     VSH_MEASURE_NONFINITE = 0, /* NaN and infinite values of both, compared or not; the limit is always 0 */
     VSH_MEASURE_SHIFT = 1,     /* displacement, texels */
     VSH_MEASURE_PENUMBRA = 2,  /* change of the mean penumbra width, as a share: 1 is twice or half */
@@ -63,9 +63,9 @@ enum {
     VSH_MEASURE_GAINED = 4,    /* texels of the largest region that got a new shadow */
     VSH_MEASURE_RMSE = 5,      /* root mean square difference */
     VSH_MEASURE_P99 = 6,       /* 99th percentile of the differences, nearest rank */
-    VSH_MEASURE_MAX = 7,       /* largest difference */
-    VSH_MEASURE_COUNT = 8
-};
+    VSH_MEASURE_MAX = 7        /* largest difference */
+} vsh_measure;
+enum { VSH_MEASURE_COUNT = 8 };
 
 /* Touching texels that all got lighter, or all darker, with no like value nearby. Zeros if there are none. */
 typedef struct vsh_region {
@@ -154,8 +154,8 @@ typedef struct vsh_channel_comparison {
 /* NaN, and a reach of -1, mean: use the tolerance file's value, else the default. */
 typedef struct vsh_compare_files_options {
     size_t struct_size;
-    const char
-        *tolerances; /* JSON file of limits (docs/pipeline.md); NULL: GOLDEN.tolerance.json if it exists */
+    /* JSON file of limits (docs/pipeline.md); NULL: GOLDEN.tolerance.json if it exists */
+    const char *tolerances;
     const char *coverage; /* channel of images with coverage; if it is missing, everything is covered */
     double limits[VSH_MEASURE_COUNT]; /* of all channels */
     double coverage_limit;            /* share of covered texels that may be in one file alone */

@@ -22,31 +22,31 @@ enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
 #define VSH_IMAGE_RGB "vdbshade_rgb"
 
 /* The kind of a channel, which decides how integers store it. */
-enum {
+typedef enum vsh_channel_kind {
     VSH_CHANNEL_DATA = 0,  /* 0 … 1, as it is */
     VSH_CHANNEL_LIGHT = 1, /* linear light, which VSH_COLOR_AUTO encodes */
     VSH_CHANNEL_VECTOR = 2 /* a component from -1 to 1: integers store (1 + x) / 2 */
-};
+} vsh_channel_kind;
 
 /* Named planes. A view. width × height × channel_count is at most 2^31. */
 typedef struct vsh_image {
     int32_t width;         /* pixels, ≥ 1 */
     int32_t height;        /* pixels, ≥ 1 */
     int32_t channel_count; /* 1 … VSH_MAX_CHANNELS */
-    const char *const
-        *names; /* [channel_count], unique: "shadow.sun", "ao", "A"; 1 … VSH_CHANNEL_NAME - 1 bytes */
-    const float *const *planes; /* [channel_count][height × width], row 0 on top */
-    const int32_t *holds;       /* [channel_count]: VSH_CHANNEL_…; NULL: all are data */
+    /* [channel_count], unique: "shadow.sun", "ao", "A"; 1 … VSH_CHANNEL_NAME - 1 bytes */
+    const char *const *names;
+    const float *const *planes;    /* [channel_count][height × width], row 0 on top */
+    const vsh_channel_kind *holds; /* [channel_count]; NULL: all are data */
 } vsh_image;
 
 /* How R, G and B are stored in integers. Programs read R, G and B of 8 and 16 bits as sRGB unless told
  * otherwise. */
-enum {
+typedef enum vsh_color_space {
     VSH_COLOR_AUTO = 0,   /* sRGB if R, G and B are all VSH_CHANNEL_LIGHT, else linear */
     VSH_COLOR_LINEAR = 1, /* as they are */
     VSH_COLOR_SRGB = 2,   /* through the curve of IEC 61966-2-1 */
     VSH_COLOR_ENCODED = 3 /* already encoded: the file only says sRGB */
-};
+} vsh_color_space;
 
 /* Light that the integers of a file cut off. */
 typedef struct vsh_image_clipping {
@@ -60,16 +60,16 @@ typedef struct vsh_image_options {
     size_t struct_size;
     int32_t bits; /* 8 and 16: integers (16 in EXR: half float), 32: float; 0: 32 for EXR, else the first of
                      16, 8 and 32 that the format has */
-    const char *
-        pack; /* "R=shadow.sun,G=ao,A=A": sources of R, G, B and A, as channels or the numbers 0 and 1.
-                 Missing R, G and B are 0; without A there is no alpha. "rgb": the picture, that is
-                 irradiance, else the mean of the shadows times AO. "channels": every channel by name, without
-                 the picture. NULL: in EXR every channel by name, and the picture as R, G and B; in other
-                 formats irradiance, else the first three channels but A (a single one as grey), and A */
-    const vsh_attribute
-        *attributes; /* [attribute_count]: attributes of EXR and text of PNG; other formats lack them */
+    /* "R=shadow.sun,G=ao,A=A": sources of R, G, B and A, as channels or the numbers 0 and 1. Missing R, G and
+     * B are 0; without A there is no alpha. "rgb": the picture, that is irradiance, else the mean of the
+     * shadows times AO. "channels": every channel by name, without the picture. NULL: in EXR every channel by
+     * name, and the picture as R, G and B; in other formats irradiance, else the first three channels but A
+     * (a single one as grey), and A */
+    const char *pack;
+    /* [attribute_count]: attributes of EXR and text of PNG; other formats lack them */
+    const vsh_attribute *attributes;
     size_t attribute_count;
-    int32_t color_space;          /* VSH_COLOR_…: of R, G and B in integers. A and floats are linear */
+    vsh_color_space color_space;  /* of R, G and B in integers. A and floats are linear */
     vsh_image_clipping *clipping; /* filled by vsh_image_write(); may be NULL */
 } vsh_image_options;
 

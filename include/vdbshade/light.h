@@ -16,18 +16,20 @@
 
 VSH_BEGIN_C
 
-enum {
+/* Shapes of lights, and the members that place them. */
+typedef enum vsh_light_type {
     VSH_LIGHT_DIRECTIONAL = 0, /* direction, angle */
     VSH_LIGHT_SPHERE = 1,      /* position, radius */
     VSH_LIGHT_SPOT = 2,        /* position, radius, axis, inner_angle, outer_angle */
     VSH_LIGHT_RECTANGLE = 3    /* position, edge_u, edge_v, two_sided */
-};
+} vsh_light_type;
 
-enum {
+/* How light falls off with the distance d. */
+typedef enum vsh_falloff {
     VSH_FALLOFF_NONE = 0,
     VSH_FALLOFF_INVERSE_SQUARE = 1, /* 1 / d² */
     VSH_FALLOFF_QUADRATIC = 2       /* (1 - d / reach)², 0 beyond the reach */
-};
+} vsh_falloff;
 
 /* A light. Shadow values depend on its shape and place alone; falloff, colour, a spot's edge and cosines
  * enter irradiance. But points beyond the reach of VSH_FALLOFF_QUADRATIC, or outside a spot's outer cone, get
@@ -41,8 +43,8 @@ enum {
  * cosine at the light; with VSH_FALLOFF_INVERSE_SQUARE each part has its own distance and cosine, which sums
  * to its solid angle over its area. */
 typedef struct vsh_light {
-    int32_t type;        /* VSH_LIGHT_… */
-    int32_t falloff;     /* VSH_FALLOFF_…; not of directional lights */
+    vsh_light_type type; /* decides which members apply */
+    vsh_falloff falloff; /* not of directional lights */
     double direction[3]; /* directional: towards the light. Any length but 0 */
     double position[3];  /* of the centre, world units */
     double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
@@ -69,8 +71,8 @@ static inline vsh_light vsh_light_default(void) {
                        0.00925,
                        0.0,
                        {0.0, -1.0, 0.0},
-                       0.35,
-                       0.5,
+                       0.7,
+                       1.0,
                        1.0,
                        {1.0, 1.0, 1.0},
                        "sun",
@@ -93,12 +95,13 @@ VSH_API void vsh_light_text(const vsh_light *light, char *text, size_t size);
 /* How a shadow is estimated. s is the sine of the light's half angle, and h the distance to the nearest
  * caster at a distance t along the ray. Methods without rays are previews: their error depends on the scene.
  */
-enum {
-    VSH_SHADOW_HARD = 0, /* the light's centre: 0 or 1 (Hart, "Sphere tracing", 1996) */
-    VSH_SHADOW_CLASSIC =
-        1, /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs", 2010) */
-    VSH_SHADOW_PRACTICAL =
-        2, /* the same x through 3x² - 2x³, ending at x < 0.004 (Quilez, "outdoors lighting", 2013) */
+typedef enum vsh_shadow_method {
+    VSH_SHADOW_OF_SCENE = -1, /* for layers of a scene: the scene's method */
+    VSH_SHADOW_HARD = 0,      /* the light's centre: 0 or 1 (Hart, "Sphere tracing", 1996) */
+    /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs", 2010) */
+    VSH_SHADOW_CLASSIC = 1,
+    /* the same x through 3x² - 2x³, ending at x < 0.004 (Quilez, "outdoors lighting", 2013) */
+    VSH_SHADOW_PRACTICAL = 2,
     VSH_SHADOW_IMPROVED = 3, /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
     VSH_SHADOW_SMOOTH = 4,   /* inner and outer penumbra, cubic remap (Quilez, 2018) */
     VSH_SHADOW_CONE = 5,     /* inner and outer penumbra: the share of a disc behind an edge */
@@ -106,25 +109,26 @@ enum {
     VSH_SHADOW_ADAPTIVE = 7, /* cones that prove full light or shadow, else rays until max_error */
     VSH_SHADOW_EXACT = 8,    /* the same, with rays against the casters' triangles */
     VSH_SHADOW_AUTO = 9      /* exact if the occluders have triangles, else adaptive */
-};
+} vsh_shadow_method;
 
-enum {
+/* How ambient occlusion is estimated. */
+typedef enum vsh_ao_method {
     VSH_AO_TAPS = 0,  /* five samples along the normal (Quilez, "multiresolution ambient occlusion", 2008) */
     VSH_AO_CONES = 1, /* cosine-weighted cones through the field (Crassin and others, 2011) */
     VSH_AO_RAYS = 2,  /* `rays` cosine-weighted rays, marched through the field */
     VSH_AO_ADAPTIVE = 3, /* the same, with as many rays as max_error needs */
-    VSH_AO_EXACT =
-        4, /* the same against the casters' triangles, from the points themselves without start_offset */
+    /* the same against the casters' triangles, from the points themselves without start_offset */
+    VSH_AO_EXACT = 4,
     VSH_AO_AUTO = 5 /* exact if the occluders have triangles, else adaptive */
-};
+} vsh_ao_method;
 
 /* Traits of methods: bits. */
-enum {
+typedef enum vsh_method_trait {
     VSH_METHOD_RAYS = 1,        /* casts rays, and knows the error that they leave */
     VSH_METHOD_KEEPS_ERROR = 2, /* casts as many as max_error needs */
     VSH_METHOD_TRIANGLES = 4,   /* needs triangles */
     VSH_METHOD_INNER = 8 /* shadows: knows the inner penumbra, where less than half of the light is visible */
-};
+} vsh_method_trait;
 
 /* Return the traits of a method, 0 for an unknown one. For auto, those that adaptive and exact share. */
 VSH_API uint32_t vsh_shadow_method_traits(int32_t method);
@@ -132,33 +136,33 @@ VSH_API uint32_t vsh_ao_method_traits(int32_t method);
 
 /* How rays are distributed over the light's disc or the hemisphere. vsh_shade_options.frame picks an
  * independent set: bakes of frames 0 … n - 1 may be averaged. */
-enum {
-    VSH_SAMPLER_SOBOL =
-        0, /* Owen-scrambled Sobol points (Burley, "Practical hash-based Owen scrambling", 2020) */
+typedef enum vsh_sampler {
+    /* Owen-scrambled Sobol points (Burley, "Practical hash-based Owen scrambling", 2020) */
+    VSH_SAMPLER_SOBOL = 0,
     VSH_SAMPLER_WHITE = 1, /* independent */
-    VSH_SAMPLER_BLUE =
-        2 /* best-candidate points (Mitchell, 1991), rotated for each texel by a blue-noise
-             mask   (Ulichney, "Void and cluster", 1993) that frames shift by the golden ratio */
-};
+    /* best-candidate points (Mitchell, 1991), rotated for each texel by a blue-noise mask   (Ulichney, "Void
+       and cluster", 1993) that frames shift by the golden ratio */
+    VSH_SAMPLER_BLUE = 2
+} vsh_sampler;
 
 /* How shadow and AO are computed. */
 typedef struct vsh_shade_options {
     size_t struct_size;
-    int32_t method;        /* VSH_SHADOW_… (auto) */
-    int32_t ao_method;     /* VSH_AO_… (auto) */
-    int32_t ao_cones;      /* for VSH_AO_CONES: 1 … 256 */
-    int32_t max_steps;     /* of a march, 16 … 65536; rays that need more count as unfinished */
-    double ao_distance;    /* how far occluders count, world units, > 0 (2^-1000 … 2^1000) */
-    double start_offset;   /* how far above a point rays start, along its normal, voxels, 0 … 16 */
+    vsh_shadow_method method; /* (auto) */
+    vsh_ao_method ao_method;  /* (auto) */
+    int32_t ao_cones;         /* for VSH_AO_CONES: 1 … 256 */
+    int32_t max_steps;        /* of a march, 16 … 65536; rays that need more count as unfinished */
+    double ao_distance;       /* how far occluders count, world units, > 0 (2^-1000 … 2^1000) */
+    double start_offset;      /* how far above a point rays start, along its normal, voxels, 0 … 16 */
     double surface_offset; /* added to it, world units, 0 … 2^1000: half the thickness if the receiver itself
                               is a shell in the field */
     int32_t rays; /* for rays: their number (0: 64). For adaptive and exact: the most that a value takes, 0 …
                      4096; 0: as many as max_error needs, up to 16384 (blue: 4096) */
-    int32_t sampler; /* VSH_SAMPLER_…; blue becomes sobol for adaptive and exact with max_error below 0.02,
+    vsh_sampler sampler; /* blue becomes sobol for adaptive and exact with max_error below 0.02,
                         and for AO of lightmaps whose texels share rays */
-    int32_t frame;   /* ≥ 0 */
-    int32_t early_rays; /* for rays: if this many first rays agree, skip the rest; 0: never */
-    double max_error;   /* for adaptive and exact: root mean square error of the values, 1e-4 … 1 (0.02) */
+    int32_t frame;       /* ≥ 0 */
+    int32_t early_rays;  /* for rays: if this many first rays agree, skip the rest; 0: never */
+    double max_error;    /* for adaptive and exact: root mean square error of the values, 1e-4 … 1 (0.02) */
     double jitter;   /* shadows by one march, except improved: shorten steps by up to this share, 0 … 1, at
                         random   for each texel, which turns bands into grain */
     double ao_up[3]; /* AO over this horizon only, any length: the free share of the directions with d · ao_up
@@ -213,9 +217,9 @@ typedef struct vsh_points {
     const double *positions; /* [count][3], world units */
     const float *normals; /* [count][3], geometric, of any length, away from the solid. NULL (shadows only):
                              no start offset, no horizon, no back side */
-    const uint32_t
-        *texels; /* [count] of vsh_texel(): they seed the samplers, so that noise does not depend on the
-                    order of points, and place points in the lightmap. NULL: the points' indices */
+    /* [count] of vsh_texel(): they seed the samplers, so that noise does not depend on the order of points,
+     * and place points in the lightmap. NULL: the points' indices */
+    const uint32_t *texels;
 } vsh_points;
 
 /* Work counters. Calls add to them, also cancelled ones. Begin with vsh_shade_stats_zero(). */
@@ -268,16 +272,16 @@ VSH_API vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points
 
 /* Colours of penumbrae: red reaches farther into the shadow (Quilez, "outdoors lighting", 2013). V is the
  * visibility. */
-enum {
+typedef enum vsh_tint_type {
     VSH_TINT_NONE = 0,      /* (V, V, V) */
     VSH_TINT_QUADRATIC = 1, /* (V, V²/2 + V/2, V²) */
     VSH_TINT_POWER = 2      /* V to the power of each channel, such as (1, 1.2, 1.5) */
-};
+} vsh_tint_type;
 
 /* How a penumbra is tinted. */
 typedef struct vsh_tint {
-    int32_t type;    /* VSH_TINT_… */
-    double power[3]; /* VSH_TINT_POWER: for R, G and B, 1/16 … 16 */
+    vsh_tint_type type; /* how */
+    double power[3];    /* VSH_TINT_POWER: for R, G and B, 1/16 … 16 */
 } vsh_tint;
 
 /* Adds the irradiance of one light, linear RGB, to irradiance[count][3]: visibility[count] × colour × falloff

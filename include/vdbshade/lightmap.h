@@ -11,6 +11,11 @@
  *     vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, &run, &lightmap, NULL, &error);
  *     vsh_charts_free(charts);
  *
+ * Texel (column, row) has its centre at u = (column + 1/2) / width, v = 1 - (row + 1/2) / height. It is
+ * shaded at the point of the mesh that has these UVs. A receiver shadows itself only if it is among the
+ * casters too. Texels that lie inside a caster, such as the floor under a box, have no value of their own:
+ * coverage (A in images) is 0 there, and they are filled from their neighbours.
+ *
  * vsh_bake_scene() bakes whole files instead. */
 #pragma once
 
@@ -25,18 +30,18 @@ enum { VSH_MAX_PAGES = 1024, VSH_MAX_PAGE_SIZE = 65536 };
 /* --- lightmap UVs */
 
 /* The UVs that charts are made of. */
-enum {
+typedef enum vsh_unwrap_uvs {
     VSH_UNWRAP_ALWAYS = 0, /* new ones */
     VSH_UNWRAP_KEEP = 1 /* a mesh's own, if they lie in the unit square, run one way and do not overlap: their
                            connected parts are packed as charts; else new ones */
-};
+} vsh_unwrap_uvs;
 
 /* The charts that share a page. */
-enum {
+typedef enum vsh_atlas_sharing {
     VSH_ATLAS_SHARED = 0, /* charts of any mesh */
-    VSH_ATLAS_OBJECTS =
-        1 /* charts of one object: consecutive meshes with one vsh_mesh.object above 0, or one mesh */
-};
+    /* charts of one object: consecutive meshes with one vsh_mesh.object above 0, or one mesh */
+    VSH_ATLAS_OBJECTS = 1
+} vsh_atlas_sharing;
 
 /* How meshes are unwrapped. */
 typedef struct vsh_unwrap_options {
@@ -44,14 +49,14 @@ typedef struct vsh_unwrap_options {
     int32_t width;     /* texels of each page, 1 … VSH_MAX_PAGE_SIZE */
     int32_t height;    /* the same */
     int32_t max_pages; /* 1 … VSH_MAX_PAGES; 1 with VSH_ATLAS_OBJECTS, where each object has one */
-    int32_t
-        padding; /* free texels between charts along rows and columns, 0 … 4096; none at a page's border */
+    /* free texels between charts along rows and columns, 0 … 4096; none at a page's border */
+    int32_t padding;
     double texels_per_unit; /* texels along a world unit, ≥ 0; 0: the most at which everything fits into
                                max_pages, to a few hundredths */
     const double *density;  /* [mesh_count] factors of texels_per_unit, > 0; NULL: all 1 */
     double max_stretch;     /* largest L2 stretch of a chart, ≥ 1.01; charts are split until they keep it */
-    int32_t keep_uvs;       /* VSH_UNWRAP_… */
-    int32_t atlas;          /* VSH_ATLAS_…; without texels_per_unit each object fills its own page */
+    vsh_unwrap_uvs keep_uvs; /* whether meshes may keep their UVs */
+    vsh_atlas_sharing atlas; /* without texels_per_unit each object fills its own page */
     int32_t fit_pages; /* nonzero, with texels_per_unit: `width` × `height` is the largest page. A page gets
                           the smallest powers of two (or the given sizes) that its charts need */
 } vsh_unwrap_options;
@@ -164,9 +169,9 @@ typedef struct vsh_lightmap_options {
     int32_t width;       /* texels, 1 … VSH_MAX_LIGHTMAP_SIZE */
     int32_t height;      /* the same */
     int32_t supersample; /* N: N × N samples a texel, 1 … 16 */
-    int32_t
-        padding; /* texels that charts grow by, 0 … 4096; fills values, never coverage. VSH_PADDING_AUTO: 16,
-                    and texels farther off get the mean of a mip level, so that no level shows background */
+    /* texels that charts grow by, 0 … 4096; fills values, never coverage. VSH_PADDING_AUTO: 16, and texels
+     * farther off get the mean of a mip level, so that no level shows background */
+    int32_t padding;
     vsh_shade_options shade; /* for bakes without options of their own */
     int32_t ao_spacing; /* 1, 2, 4 or 8 texels. Above 1, texels share the rays of exact and adaptive AO. 1,
                            and with supersampling: they do not */
@@ -226,10 +231,10 @@ VSH_API void vsh_charts_get_info(const vsh_charts *charts, vsh_charts_info *info
 /* Axes of bent normals. Tangent space: x along growing u of the lightmap's UVs, orthogonal to the normal; z
  * along the normal that decides shadow; y across both, towards growing v (as in OpenGL). Tangents are those
  * of the triangle. */
-enum { VSH_BENT_WORLD = 0, VSH_BENT_TANGENT = 1 };
+typedef enum vsh_bent_space { VSH_BENT_NONE = -1, VSH_BENT_WORLD = 0, VSH_BENT_TANGENT = 1 } vsh_bent_space;
 
 /* The upward axis. */
-enum {
+typedef enum vsh_up {
     VSH_UP_NONE = 0,
     VSH_UP_X = 1,
     VSH_UP_Y = 2,
@@ -237,12 +242,12 @@ enum {
     VSH_UP_MINUS_X = 4,
     VSH_UP_MINUS_Y = 5,
     VSH_UP_MINUS_Z = 6
-};
+} vsh_up;
 
 /* Further planes that a scene can ask for. */
 typedef struct vsh_planes {
     int32_t invalid; /* nonzero: bake `invalid` */
-    int32_t sky;     /* VSH_UP_…: bake `sky` over this axis; VSH_UP_NONE: do not */
+    vsh_up sky;      /* bake `sky` over this axis; VSH_UP_NONE: do not */
 } vsh_planes;
 
 /* A lightmap in the caller's arrays. Planes are [height][width] with row 0 at v = 1. NULL planes are not
@@ -253,18 +258,18 @@ typedef struct vsh_lightmap {
     float *irradiance; /* [height][width][3], linear RGB: Σ visibility × colour × falloff × cosine, times AO
                           if it is baked and there is no `ambient`; with `ambient`: plus ambient × AO */
     float *coverage;   /* 1 if the texel was evaluated and is valid, else 0 */
-    float *const
-        *shadow_error; /* [light_count] planes: standard error left in each value, not padded; may be NULL */
-    float *ao_error;   /* the same of AO. If texels share rays, it is the rays' part; vsh_bake_stats.errors
-                          measures the rest */
-    float *bent;       /* [height][width][3]: bent normals, unit */
-    float *const
-        *tint; /* [light_count] planes [height][width][3]: tinted visibility, linear RGB; may be NULL */
-    vsh_tint tint_by;      /* tint of these planes, and of the visibility in irradiance */
-    const double *ambient; /* [3]: light from all around, linear RGB ≥ 0; NULL: none */
-    int32_t bent_space;    /* VSH_BENT_…; tangent space needs vsh_lightmap_options.tangents */
-    float *invalid;        /* 1 if a chart covers the texel but no sample is valid, else 0. Not padded */
-    vsh_planes asked;      /* options of planes, such as the sky's axis */
+    /* [light_count] planes: standard error left in each value, not padded; may be NULL */
+    float *const *shadow_error;
+    float *ao_error; /* the same of AO. If texels share rays, it is the rays' part; vsh_bake_stats.errors
+                        measures the rest */
+    float *bent;     /* [height][width][3]: bent normals, unit */
+    /* [light_count] planes [height][width][3]: tinted visibility, linear RGB; may be NULL */
+    float *const *tint;
+    vsh_tint tint_by;          /* tint of these planes, and of the visibility in irradiance */
+    const double *ambient;     /* [3]: light from all around, linear RGB ≥ 0; NULL: none */
+    vsh_bent_space bent_space; /* tangent space needs vsh_lightmap_options.tangents */
+    float *invalid;            /* 1 if a chart covers the texel but no sample is valid, else 0. Not padded */
+    vsh_planes asked;          /* options of planes, such as the sky's axis */
     float *sky; /* light of an even sky above the horizon of `asked.sky`, 1/π ∫ V(ω) max(0, n · ω)
                    [ω · up > 0] dω, with V 0 behind casters at any distance. Unoccluded it is
                    (1 + n · up) / 2: floors 1, walls 1/2, ceilings 0. By shade.ao_method, which must be
@@ -306,11 +311,11 @@ typedef struct vsh_bake_stats {
                                   within the padding (8   texels at least) */
     uint64_t *invalid_by_mesh; /* [mesh_count]; NULL: not counted */
     vsh_shade_stats shade;     /* added to */
-    vsh_bake_error
-        *errors; /* [light_count + 1], with a sky plane [light_count + 2]: of each light, AO and the sky;
-                    added to; NULL: not measured. If the method knows an error and the occluders keep all
-                    casters, some samples (1 in 16, 4096 to 16384; for exact methods 1 in 64, 1024 to 4096)
-                    are compared with rays against the casters. The choice depends on the lightmap alone */
+    /* [light_count + 1], with a sky plane [light_count + 2]: of each light, AO and the sky; added to; NULL:
+     * not measured. If the method knows an error and the occluders keep all casters, some samples (1 in 16,
+     * 4096 to 16384; for exact methods 1 in 64, 1024 to 4096) are compared with rays against the casters. The
+     * choice depends on the lightmap alone */
+    vsh_bake_error *errors;
 } vsh_bake_stats;
 
 static inline vsh_bake_stats vsh_bake_stats_zero(void) {
@@ -332,11 +337,12 @@ VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_c
 
 /* --- seams: edges of charts that look different on their two sides */
 
-enum {
+/* What becomes of seams. */
+typedef enum vsh_seams {
     VSH_SEAMS_DEFAULT = 0, /* FIX for outputs that are assets (vsh_lit_is_output()), else KEEP */
     VSH_SEAMS_KEEP = 1,    /* keep the baked values */
     VSH_SEAMS_FIX = 2      /* vsh_lightmaps_stitch() */
-};
+} vsh_seams;
 
 /* How seams are stitched. */
 typedef struct vsh_stitch_options {

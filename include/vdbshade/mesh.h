@@ -22,43 +22,33 @@ enum { VSH_MAX_UV_SETS = 8 };
  * ones that enclose nearly all of what lies behind their faces, are solid if their faces look outwards. If
  * their faces look inwards, they are rooms cut out of the solids around them, or else thin walls behind the
  * faces. Components that enclose nothing are sheets with air on both sides. */
-enum {
+typedef enum vsh_solidity {
     VSH_SOLIDITY_AUTO,
     VSH_SOLIDITY_SOLID, /* solid, closed over holes, whichever way faces look */
     VSH_SOLIDITY_SHELL, /* all sheets */
     VSH_SOLIDITY_INWARD /* a room or a wall: air inside, whichever way faces look */
-};
+} vsh_solidity;
 
 /* How the material of a mesh treats light that passes (glTF's alphaMode). */
-enum {
+typedef enum vsh_alpha_mode {
     VSH_ALPHA_OPAQUE = 0,
     VSH_ALPHA_MASKED = 1, /* its texture cuts holes */
     VSH_ALPHA_BLENDED = 2 /* glass, smoke */
-};
+} vsh_alpha_mode;
 
 /* How a texture continues outside 0 … 1. */
-enum {
+typedef enum vsh_wrap {
     VSH_WRAP_REPEAT = 0,
     VSH_WRAP_MIRROR = 1, /* repeated, every other time mirrored */
     VSH_WRAP_CLAMP = 2   /* its edge continues */
-};
-
-/* The channel of an image that is a material's alpha. */
-enum {
-    VSH_MASK_CHANNEL_ALPHA = 0, /* A; 1 if there is none */
-    VSH_MASK_CHANNEL_RED = 1,
-    VSH_MASK_CHANNEL_GREEN = 2,
-    VSH_MASK_CHANNEL_BLUE = 3,
-    VSH_MASK_CHANNEL_LUMINANCE = 4, /* 0.2126 R + 0.7152 G + 0.0722 B of stored values, or Y */
-    VSH_MASK_CHANNEL_AUTO = 5       /* A if it is below 1 anywhere, else the luminance */
-};
+} vsh_wrap;
 
 /* A texture that cuts a mesh: light passes where base_alpha × the texture's alpha, sampled bilinearly, is
  * below alpha_cutoff (glTF 2.0, 3.9.4). A view. */
 typedef struct vsh_alpha_mask {
     const uint8_t *alpha;   /* [height][width], 255 is 1, row 0 on top (v = 1) */
     int32_t width, height;  /* texels, ≥ 1 */
-    int32_t wrap[2];        /* VSH_WRAP_…, along u and v */
+    vsh_wrap wrap[2];       /* along u and v */
     double uv_transform[6]; /* rows (a, b, c), (d, e, f): sampled at u' = a u + b v + c, v' = d u + e v + f,
                                with v up; finite */
     double alpha_cutoff;    /* ≥ 0 */
@@ -78,9 +68,9 @@ typedef struct vsh_mesh {
                                 scale unevenly and shear, but not flatten; NULL: identity */
     const char *object_name; /* of the object that it belongs to; NULL: `name` */
     uint32_t object;         /* meshes with equal numbers are parts of one object; 0: an object of its own */
-    int32_t solidity;        /* VSH_SOLIDITY_…, for casting */
+    vsh_solidity solidity;   /* for casting */
     const struct vsh_checked_mesh *checked; /* cached checks of views from a scene's assets; else NULL */
-    int32_t alpha;                          /* VSH_ALPHA_… */
+    vsh_alpha_mode alpha;                   /* of its material */
     int32_t one_sided; /* nonzero: light on the backs of its faces passes, as with back-face culling. Methods
                           that march voxels ignore it */
     const vsh_alpha_mask *mask; /* what cuts it; it then casts as a sheet. NULL: nothing */
@@ -192,20 +182,20 @@ typedef struct vsh_heights_source {
 } vsh_heights_source;
 
 /* The part of a heightfield that becomes a mesh. */
-enum {
+typedef enum vsh_heights_part {
     VSH_HEIGHTS_SOLID = 0,  /* the closed surface, without UVs: a caster */
     VSH_HEIGHTS_SURFACE = 1 /* the top: a receiver. UVs are 0 … 1, u along x and v against z, so row 0 of a
                                lightmap lies over row 0 of the heights. Normals are central differences */
-};
+} vsh_heights_part;
 
 /* Makes a model with one mesh. Free it with vsh_model_free(). Errors:
- * - VSH_ERROR_ARGUMENT: source, values or model NULL, sizes or `what` out of range, run;
+ * - VSH_ERROR_ARGUMENT: source, values or model NULL, sizes or `part` out of range, run;
  * - VSH_ERROR_INPUT: a value that is not finite, before or after scaling, by its row and column;
  * - VSH_ERROR_LIMIT: more than 2^32 - 1 vertices; run->memory_limit (36 bytes a sample for a solid, 56 for a
  *   surface);
  * - VSH_ERROR_MEMORY. */
-VSH_API vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what, const vsh_run *run,
-                                          vsh_model **model, vsh_error *error);
+VSH_API vsh_result vsh_model_from_heights(const vsh_heights_source *source, vsh_heights_part part,
+                                          const vsh_run *run, vsh_model **model, vsh_error *error);
 
 /* --- procedural signed distance fields
  *
@@ -213,7 +203,8 @@ VSH_API vsh_result vsh_model_from_heights(const vsh_heights_source *source, int3
  * Then the node's scale, rotation and translation apply, in that order. Sources: I. Quilez, "distance
  * functions" (2008 …), "exact SDF of a capped cone" (2018), "smooth minimum" (2013). */
 
-enum {
+/* Shapes and operations, and the members that they take. */
+typedef enum vsh_sdf_shape {
     VSH_SDF_SPHERE = 0,       /* radius */
     VSH_SDF_BOX = 1,          /* size: half edges; grown by rounding on every side */
     VSH_SDF_TORUS = 2,        /* around y: radius of the ring, minor_radius of the tube */
@@ -225,12 +216,12 @@ enum {
     VSH_SDF_INTERSECTION = 8, /* left, right */
     VSH_SDF_SUBTRACTION = 9,  /* left without right */
     VSH_SDF_SMOOTH_UNION = 10 /* left, right, blended over a distance of `smoothing` */
-};
+} vsh_sdf_shape;
 
 /* A node. Numbers are finite, lengths in world units before `scale`. Members that a shape does not name are
  * ignored. */
 typedef struct vsh_sdf_node {
-    int32_t shape;         /* VSH_SDF_… */
+    vsh_sdf_shape shape;   /* or operation */
     int32_t left;          /* operations: index of the first operand, below this node's own */
     int32_t right;         /* operations: index of the second operand, below this node's own */
     double size[3];        /* > 0 */
@@ -279,14 +270,15 @@ static inline vsh_mask_options vsh_mask_options_default(void) {
     return options;
 }
 
-enum { VSH_ALIGN_LEFT = 0, VSH_ALIGN_CENTER = 1, VSH_ALIGN_RIGHT = 2 };
+/* How lines of text are aligned. */
+typedef enum vsh_align { VSH_ALIGN_LEFT = 0, VSH_ALIGN_CENTER = 1, VSH_ALIGN_RIGHT = 2 } vsh_align;
 
 /* How text becomes an outline. */
 typedef struct vsh_text_options {
     size_t struct_size;
     double height;       /* of the font's em, world units, > 0 … 1e15; capitals are about 0.7 of it */
     double line_spacing; /* between baselines, as a multiple of the font's own, > 0 … 1e3 */
-    int32_t align;       /* VSH_ALIGN_…: where lines lie relative to x = 0 */
+    vsh_align align;     /* where lines lie relative to x = 0 */
 } vsh_text_options;
 
 static inline vsh_text_options vsh_text_options_default(void) {

@@ -83,10 +83,10 @@ typedef struct vsh_occluders_info {
 VSH_API void vsh_occluders_get_info(const vsh_occluders *occluders, vsh_occluders_info *info);
 
 /* How the visibility of a scene's layer is combined with that of the others. */
-enum {
+typedef enum vsh_combine {
     VSH_COMBINE_MULTIPLY = 0, /* product: layers hide independent parts of a light */
     VSH_COMBINE_MIN = 1       /* minimum: layers hide the same part of it */
-};
+} vsh_combine;
 
 /* --- the field: a pyramid of narrow bands that shadows are marched through
  *

@@ -65,9 +65,9 @@ typedef struct vsh_surface {
 typedef struct vsh_lit_meshes {
     const vsh_mesh *meshes; /* [mesh_count], with the UVs of the lightmap */
     size_t mesh_count;
-    const vsh_image
-        *lightmap; /* of any size, row 0 at v = 1, sampled bilinearly: irradiance.R, .G, .B, or shadow.NAME of
-                      every light and `ao` if there is one. NULL: shade each point */
+    /* of any size, row 0 at v = 1, sampled bilinearly: irradiance.R, .G, .B, or shadow.NAME of every light
+     * and `ao` if there is one. NULL: shade each point */
+    const vsh_image *lightmap;
     double color[3]; /* albedo, as of a surface */
     int32_t ambient; /* nonzero: the lightmap's irradiance contains the sky's light (vsh_lightmap.ambient) */
 } vsh_lit_meshes;
@@ -162,8 +162,8 @@ typedef struct vsh_view_bake {
     const char *model; /* as of vsh_model_read(). A GLB (2.0) goes into the page with its materials and
                           textures; of others, and of compressed geometry, only triangles, normals and UVs.
                           NULL, of a second bake: the first one's */
-    const char *const
-        *planes; /* [plane_count] image files of its channels, one for each page of its lightmap in order */
+    /* [plane_count] image files of its channels, one for each page of its lightmap in order */
+    const char *const *planes;
     size_t plane_count; /* 0 … VSH_MAX_VIEW_PLANES; 0: the light is in the materials, or missing */
     int32_t uv_set;     /* of the lightmap, 0 … VSH_MAX_UV_SETS - 1; -1: that of MOZ_lightmap, else of an
                            occlusionTexture with its own set, else as of vsh_model_mesh() */
@@ -201,25 +201,26 @@ VSH_API vsh_result vsh_view_write_scene(const char *path, const char *name, cons
  * Casters are areas of the xy-plane. Shadow is the share of the angle under which a point sees the light's
  * disc. */
 
-enum {
+/* How the shadow of a flat scene is computed. */
+typedef enum vsh_flat_method {
     VSH_FLAT_HARD = 0, /* the light's centre: 0 or 1, exact */
-    VSH_FLAT_CLASSIC =
-        1, /* min h/(s t) along the ray to the centre, outer penumbra only, with h from a grid of distances
-              and s the sine of the light's half angle (Kaplan's 2D lighting after Quilez, 2010) */
+    /* min h/(s t) along the ray to the centre, outer penumbra only, with h from a grid of distances and s the
+       sine of the light's half angle (Kaplan's 2D lighting after Quilez, 2010) */
+    VSH_FLAT_CLASSIC = 1,
     VSH_FLAT_EXACT = 2 /* the union of the hidden angles, in closed form */
-};
+} vsh_flat_method;
 
 /* How a light map of a plane is made. */
 typedef struct vsh_flat_options {
     size_t struct_size;
-    int32_t width;        /* texels, 1 … 65536 */
-    int32_t height;       /* the same */
-    double region_min[2]; /* world rectangle of the map, finite, at most 1e15 in size */
-    double region_max[2]; /* the other corner; row 0 is at y = region_max[1] */
-    int32_t method;       /* VSH_FLAT_… */
-    int32_t supersample;  /* N: N × N samples a texel, 1 … 16 */
-    int32_t padding;      /* texels that values grow by into solids, 0 … 4096; never coverage */
-    int32_t max_steps;    /* classic: steps of a march, 16 … 65536 */
+    int32_t width;          /* texels, 1 … 65536 */
+    int32_t height;         /* the same */
+    double region_min[2];   /* world rectangle of the map, finite, at most 1e15 in size */
+    double region_max[2];   /* the other corner; row 0 is at y = region_max[1] */
+    vsh_flat_method method; /* of shadows */
+    int32_t supersample;    /* N: N × N samples a texel, 1 … 16 */
+    int32_t padding;        /* texels that values grow by into solids, 0 … 4096; never coverage */
+    int32_t max_steps;      /* classic: steps of a march, 16 … 65536 */
 } vsh_flat_options;
 
 static inline vsh_flat_options vsh_flat_options_default(void) {
@@ -228,17 +229,18 @@ static inline vsh_flat_options vsh_flat_options_default(void) {
     return options;
 }
 
-enum {
+/* Casters of a flat scene, and the members that they take. */
+typedef enum vsh_flat_type {
     VSH_FLAT_MASK = 0,   /* path, mask */
     VSH_FLAT_TEXT = 1,   /* path (the font), text, letters */
     VSH_FLAT_CIRCLE = 2, /* radius; a polygon of 256 sides and equal area */
     VSH_FLAT_BOX = 3,    /* half_size */
     VSH_FLAT_POLYGON = 4 /* points */
-};
+} vsh_flat_type;
 
 /* A caster of a flat scene. Members apply to the types that name them. */
 typedef struct vsh_flat_caster {
-    int32_t type;             /* VSH_FLAT_… */
+    vsh_flat_type type;       /* decides which members apply */
     const char *path;         /* file */
     vsh_mask_options mask;    /* how the image becomes an outline */
     const char *text;         /* UTF-8 */
@@ -261,7 +263,7 @@ typedef struct vsh_flat_scene {
     const char *output;       /* image file; NULL: none */
     int32_t bits;             /* these three as in vsh_image_options */
     const char *pack;
-    int32_t color_space;
+    vsh_color_space color_space;
 } vsh_flat_scene;
 
 /* An empty scene. */

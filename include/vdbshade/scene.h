@@ -18,7 +18,8 @@ VSH_BEGIN_C
 
 /* --- casters */
 
-enum {
+/* Kinds of casters. */
+typedef enum vsh_caster_type {
     VSH_CASTER_MESH = 0,
     VSH_CASTER_SDF = 1,
     VSH_CASTER_VDB = 2,
@@ -27,7 +28,7 @@ enum {
     VSH_CASTER_SPHERES = 4,     /* spheres of a CSV file, or given here */
     VSH_CASTER_MASK = 5,        /* an image, extruded */
     VSH_CASTER_TEXT = 6         /* text, extruded */
-};
+} vsh_caster_type;
 
 /* Which meshes of a file are meant. A pattern matches a mesh by its name, its object's name, or the part of
  * its name behind its object's ("Wall", "Cube.003" or "Wall/Cube.003" for a node Wall with a mesh Cube.003),
@@ -42,13 +43,13 @@ typedef struct vsh_selection {
 
 /* Solidity of the meshes that a pattern matches. */
 typedef struct vsh_solidity_rule {
-    const char *pattern; /* as in vsh_selection */
-    int32_t solidity;    /* VSH_SOLIDITY_… */
+    const char *pattern;   /* as in vsh_selection */
+    vsh_solidity solidity; /* of the meshes */
 } vsh_solidity_rule;
 
 /* A caster. Members apply to the types that they name. */
 typedef struct vsh_caster {
-    int32_t type;     /* VSH_CASTER_… */
+    vsh_caster_type type; /* decides which members apply */
     const char *path; /* mesh, vdb, heightfield, mask: file; text: font; spheres: NULL, or a CSV file of x, y,
                          z and radius, with commas, semicolons, tabs or blanks between */
     const char *grid; /* vdb: name of the grid; NULL: the first level set */
@@ -72,8 +73,8 @@ typedef struct vsh_caster {
     vsh_selection objects;             /* mesh: the meshes that cast */
     const vsh_solidity_rule *solidity; /* mesh: [solidity_count]; the last match wins */
     size_t solidity_count;
-    const char *const
-        *one_sided; /* mesh: [one_sided_count] patterns of one-sided meshes (vsh_mesh.one_sided) */
+    /* mesh: [one_sided_count] patterns of one-sided meshes (vsh_mesh.one_sided) */
+    const char *const *one_sided;
     size_t one_sided_count;
 } vsh_caster;
 
@@ -92,11 +93,11 @@ typedef struct vsh_scene_layer {
     const char *name;  /* unique */
     double voxel_size; /* these two as in vsh_grid_options; both 0: those of the scene */
     int32_t resolution;
-    int32_t method;  /* VSH_SHADOW_… of its shadows; -1: that of the scene. Heightfields that are marched
-                        directly know  VSH_SHADOW_HARD and VSH_SHADOW_CLASSIC; spheres in closed form know
-                        these  and one soft method,  which replaces the others */
-    int32_t combine; /* VSH_COMBINE_… */
-    double softness; /* factor on the sizes of lights, 0 (hard) … 1000 */
+    vsh_shadow_method method; /* of its shadows (VSH_SHADOW_OF_SCENE). Heightfields that are marched
+                       directly know  VSH_SHADOW_HARD and VSH_SHADOW_CLASSIC; spheres in closed form know
+                       these  and one soft method,  which replaces the others */
+    vsh_combine combine;      /* with other layers */
+    double softness;          /* factor on the sizes of lights, 0 (hard) … 1000 */
     double remap[2]; /* its shadow goes through a smoothstep from remap[0] (dark) to remap[1] (lit), within 0
                         … 1; both 0: unchanged (for clouds: Quilez, "outdoors lighting", 2013) */
     double start_offset; /* voxels, 0 … 16; -1: that of the scene. Cells of directly marched heights, where -1
@@ -110,7 +111,7 @@ typedef struct vsh_scene_layer {
 static inline vsh_scene_layer vsh_scene_layer_default(void) {
     vsh_scene_layer layer;
     memset(&layer, 0, sizeof layer);
-    layer.method = -1;
+    layer.method = VSH_SHADOW_OF_SCENE;
     layer.softness = 1.0;
     layer.start_offset = -1.0;
     layer.ao = 1;
@@ -122,17 +123,22 @@ static inline vsh_scene_layer vsh_scene_layer_default(void) {
 /* The share of a lightmap's covered texels that objects may share: charts that touch. */
 #define VSH_LARGEST_OVERLAP 0.01
 
-enum { VSH_RECEIVER_MESH = 0, VSH_RECEIVER_HEIGHTFIELD = 1, VSH_RECEIVER_PLANE = 2 };
+/* Kinds of receivers. */
+typedef enum vsh_receiver_type {
+    VSH_RECEIVER_MESH = 0,
+    VSH_RECEIVER_HEIGHTFIELD = 1,
+    VSH_RECEIVER_PLANE = 2
+} vsh_receiver_type;
 
 /* Whether a receiver gets new lightmap UVs. */
-enum {
+typedef enum vsh_receiver_unwrap {
     VSH_RECEIVER_UNWRAP_DEFAULT = 0, /* AUTO for outputs that are assets (vsh_lit_is_output()), else NEVER */
     VSH_RECEIVER_UNWRAP_NEVER = 1,
-    VSH_RECEIVER_UNWRAP_AUTO =
-        2, /* if its own are missing, leave the unit square or overlap, and if texels_per_unit, pages,
-              max_size or density are given. Meshes with good UVs keep them, packed anew */
+    /* if its own are missing, leave the unit square or overlap, and if texels_per_unit, pages, max_size or
+       density are given. Meshes with good UVs keep them, packed anew */
+    VSH_RECEIVER_UNWRAP_AUTO = 2,
     VSH_RECEIVER_UNWRAP_ALWAYS = 3
-};
+} vsh_receiver_unwrap;
 
 /* A factor of texels_per_unit for the meshes that a pattern matches. */
 typedef struct vsh_density_rule {
@@ -153,22 +159,22 @@ typedef struct vsh_receiver {
     const char *output; /* image file, or an asset (vsh_lit_is_output()) */
     int32_t bits;       /* these two as in vsh_image_options */
     const char *pack;
-    int32_t type;     /* VSH_RECEIVER_…; heightfields and planes are VSH_HEIGHTS_SURFACE, with UV set 0 */
+    vsh_receiver_type type; /* heightfields and planes are VSH_HEIGHTS_SURFACE, with UV set 0 */
     double extent[2]; /* heightfield: size in vsh_heights_source; plane: the same, flat, around the origin,
                          facing +y */
     double relief;    /* heightfield: height in vsh_heights_source. In scene files a heightfield that receives
                          also casts,    unless a caster has its image */
-    vsh_selection objects;  /* mesh: the meshes that receive */
-    int32_t partial;        /* mesh: nonzero: skip meshes without UVs, or without the set, with a warning */
-    int32_t allow_overlap;  /* nonzero: accept objects whose UVs overlap */
-    int32_t color_space;    /* as in vsh_image_options */
-    int32_t unwrap;         /* mesh: VSH_RECEIVER_UNWRAP_… */
+    vsh_selection objects; /* mesh: the meshes that receive */
+    int32_t partial;       /* mesh: nonzero: skip meshes without UVs, or without the set, with a warning */
+    int32_t allow_overlap; /* nonzero: accept objects whose UVs overlap */
+    vsh_color_space color_space; /* as in vsh_image_options */
+    vsh_receiver_unwrap unwrap;  /* mesh: whether it gets new UVs */
     double texels_per_unit; /* these two for new UVs, as in vsh_unwrap_options; `width` × `height` is a page.
                                0: as many as fit */
-    int32_t pages; /* most pages, ≤ VSH_MAX_PAGES; 0: one, or with texels_per_unit as many as it takes */
-    int32_t seams; /* mesh: VSH_SEAMS_…; FIX changes values by up to shade.max_error, and pads by 2 texels or
+    int32_t pages;   /* most pages, ≤ VSH_MAX_PAGES; 0: one, or with texels_per_unit as many as it takes */
+    vsh_seams seams; /* mesh: FIX changes values by up to shade.max_error, and pads by 2 texels or
                       more */
-    int32_t atlas; /* mesh: VSH_ATLAS_…; with OBJECTS each object has its own lightmap, and the name of its
+    vsh_atlas_sharing atlas; /* mesh: with OBJECTS each object has its own lightmap, and the name of its
                       image contains the object's */
     int32_t max_size; /* for new UVs with texels_per_unit: largest side of a page, which then has the fewest
                          texels that it needs, ≤ VSH_MAX_LIGHTMAP_SIZE; 0: pages are `width` × `height` */
@@ -216,23 +222,23 @@ typedef struct vsh_scene {
     vsh_grid_options grid;   /* of the casters' level set */
     vsh_shade_options shade; /* methods of shadow and AO */
     int32_t ao;              /* nonzero: bake AO within shade.ao_distance */
-    int32_t bent;            /* with ao: 1 + VSH_BENT_…: bake bent normals in that space; 0: none */
+    vsh_bent_space bent;     /* with ao: bake bent normals in that space */
     int32_t irradiance;      /* nonzero: bake irradiance */
     vsh_tint tint;           /* tint of shadows and irradiance; VSH_TINT_NONE: none */
     int32_t has_ambient;     /* nonzero: `ambient` applies */
     double ambient[3];       /* as in vsh_lightmap */
     vsh_planes planes;       /* further planes to bake */
     int32_t error;           /* nonzero: bake the error left in shadow and AO, if the method knows it */
-    const vsh_solidity_rule
-        *solidity; /* [solidity_count], for all mesh casters, over their own; each must match */
+    /* [solidity_count], for all mesh casters, over their own; each must match */
+    const vsh_solidity_rule *solidity;
     size_t solidity_count;
     double unit; /* metres in one unit of mesh files, > 0, instead of what they say; 0: as they say */
     int32_t voxels_named; /* nonzero: `grid` has a voxel size or resolution by choice; 0: the bake chooses the
                              voxels */
     int32_t cast_blended; /* nonzero: meshes of blended materials cast where their texture's alpha is 0.5 or
                              more */
-    const vsh_light_file
-        *light_files; /* [light_file_count], by `first`: origin of some lights; may be empty */
+    /* [light_file_count], by `first`: origin of some lights; may be empty */
+    const vsh_light_file *light_files;
     size_t light_file_count;
 } vsh_scene;
 
@@ -242,6 +248,7 @@ static inline vsh_scene vsh_scene_default(void) {
     memset(&scene, 0, sizeof scene);
     scene.grid = vsh_grid_options_default();
     scene.shade = vsh_shade_options_default();
+    scene.bent = VSH_BENT_NONE;
     return scene;
 }
 
@@ -277,7 +284,7 @@ VSH_API void vsh_lights_free(vsh_light *lights); /* NULL does nothing */
 /* --- settings: keys of scene files, options of commands, and their help, in one table */
 
 /* Topics of settings. */
-enum {
+typedef enum vsh_setting_topic {
     VSH_SETTINGS_OCCLUSION = 0, /* AO and methods of shadow */
     VSH_SETTINGS_CHANNELS = 1,  /* further channels */
     VSH_SETTINGS_ACCURACY = 2,
@@ -288,25 +295,25 @@ enum {
     VSH_SETTINGS_FLAT_TEXELS = 7,
     VSH_SETTINGS_LEVEL_SET = 8, /* narrow band of level set files */
     VSH_SETTINGS_FILE_ONLY = 9  /* keys of scene files without an option */
-};
+} vsh_setting_topic;
 
 /* Owners of settings. */
-enum {
+typedef enum vsh_setting_owner {
     VSH_SETTING_OF_SCENE = 0,    /* vsh_scene_set() */
     VSH_SETTING_OF_RECEIVER = 1, /* vsh_receiver_set() */
     VSH_SETTING_OF_FLAT = 2      /* vsh_flat_scene_set() */
-};
+} vsh_setting_owner;
 
 /* A setting. */
 typedef struct vsh_setting {
-    char key[64];        /* in a scene file: "rays", "ao.distance", "receivers.padding" */
-    char option[64];     /* of commands: "ao-method" */
-    char value[32];      /* placeholder in help: "N", "VOXELS"; "": a flag, off by default */
-    char help[320];      /* what it does */
-    char range[160];     /* "1 to 4096", "more than 0", names; "": none */
-    char otherwise[160]; /* the default: "64"; "": nothing */
-    int32_t group;       /* VSH_SETTINGS_… */
-    int32_t owner;       /* VSH_SETTING_OF_… */
+    char key[64];            /* in a scene file: "rays", "ao.distance", "receivers.padding" */
+    char option[64];         /* of commands: "ao-method" */
+    char value[32];          /* placeholder in help: "N", "VOXELS"; "": a flag, off by default */
+    char help[320];          /* what it does */
+    char range[160];         /* "1 to 4096", "more than 0", names; "": none */
+    char otherwise[160];     /* the default: "64"; "": nothing */
+    vsh_setting_topic group; /* of help */
+    vsh_setting_owner owner; /* what it belongs to */
 } vsh_setting;
 
 /* Gets setting `index`, from 0. Returns 0 beyond the last one, without changing *setting. */
@@ -483,9 +490,9 @@ typedef struct vsh_bake_options {
     const char *scratch; /* folder for nameless files beyond run->memory_limit; NULL: the output's folder */
     const char *invalid_picture; /* PNG of the invalid texels, one for each lightmap; several are
                                     FILE.OUTPUT.png. NULL: none */
-    vsh_rows_fn
-        *rows; /* receives the lightmaps instead of files. NULL: write the receivers' outputs, with their
-                  provenance; outputs that end in .glb, .gltf or .obj are assets with their light */
+    /* receives the lightmaps instead of files. NULL: write the receivers' outputs, with their provenance;
+     * outputs that end in .glb, .gltf or .obj are assets with their light */
+    vsh_rows_fn *rows;
     const char *command; /* these three as in vsh_provenance_source */
     const char *const *files;
     size_t file_count;
@@ -523,8 +530,8 @@ typedef struct vsh_bake_report {
     size_t lightmap_count;        /* 0 for a shard without tiles */
     vsh_shade_stats shade;        /* of all lightmaps */
     vsh_occluders_info occluders; /* of the scene */
-    vsh_bake_error *
-        errors; /* [2 + lights of the scene], the caller's: of each light, AO and the sky; NULL: not wanted */
+    /* [2 + lights of the scene], the caller's: of each light, AO and the sky; NULL: not wanted */
+    vsh_bake_error *errors;
 } vsh_bake_report;
 
 /* Checks whether the image or asset of receiver `index` can be written, without reading a file. Errors: as
@@ -594,27 +601,26 @@ typedef struct vsh_lit_mesh {
     size_t vertex_count;
     size_t triangle_count;
     uint32_t page; /* without charts */
-    int32_t
-        uv_set; /* without uvs: 0 … VSH_MAX_UV_SETS - 1, which the mesh must have; -1: the mesh stays unlit */
+    /* without uvs: 0 … VSH_MAX_UV_SETS - 1, which the mesh must have; -1: the mesh stays unlit */
+    int32_t uv_set;
 } vsh_lit_mesh;
 
 /* Uses of an image in the materials of its page. */
-enum {
+typedef enum vsh_lit_purpose {
     VSH_LIT_OCCLUSION = 0, /* occlusionTexture of core glTF: R, linear; replaces the file's own */
     VSH_LIT_LIGHTMAP = 1,  /* MOZ_lightmap: R, G and B, linear irradiance, times its intensity */
-    VSH_LIT_PREVIEW =
-        2, /* base colour of KHR_materials_unlit: R, G and B, sRGB, times the material's factor, instead of
-              its texture. Materials that are cut out or blended by their texture stay */
-    VSH_LIT_PURPOSES = 3
-};
+    /* base colour of KHR_materials_unlit: R, G and B, sRGB, times the material's factor, instead of its
+       texture. Materials that are cut out or blended by their texture stay */
+    VSH_LIT_PREVIEW = 2,
+} vsh_lit_purpose;
 
 /* An image of one page for one purpose, at most one each: either `png` or planes. */
 typedef struct vsh_lit_image {
-    int32_t purpose;       /* VSH_LIT_… */
-    uint32_t page;         /* from 0 */
-    const void *png;       /* [png_size] bytes of a PNG file */
-    size_t png_size;       /* bytes */
-    int32_t width, height; /* of planes: texels, 1 … 65536 */
+    vsh_lit_purpose purpose; /* its use */
+    uint32_t page;           /* from 0 */
+    const void *png;         /* [png_size] bytes of a PNG file */
+    size_t png_size;         /* bytes */
+    int32_t width, height;   /* of planes: texels, 1 … 65536 */
     const float *const
         *channels;         /* of planes: [channel_count][height × width], row 0 on top (v = 1), linear */
     int32_t channel_count; /* 1 (grey) or 3 */
@@ -624,11 +630,11 @@ typedef struct vsh_lit_image {
 } vsh_lit_image;
 
 /* Where images go. */
-enum {
+typedef enum vsh_lit_image_place {
     VSH_LIT_IMAGES_AUTO = 0,   /* into a GLB, beside a glTF */
     VSH_LIT_IMAGES_EMBED = 1,  /* into the buffer */
     VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png; OUT.PURPOSE.PAGE.png for several or named pages */
-};
+} vsh_lit_image_place;
 
 /* How a lit file is written. */
 typedef struct vsh_lit_options {
@@ -637,13 +643,13 @@ typedef struct vsh_lit_options {
     size_t chart_count;
     const vsh_lit_image *images; /* [image_count], in any order. Pages without images keep their materials */
     size_t image_count;
-    int32_t image_place;           /* VSH_LIT_IMAGES_… */
-    const char *const *page_names; /* [page_count], UTF-8, as file names may be: part of image names, and of
-                                      their files. NULL, and NULL names: numbers */
+    vsh_lit_image_place image_place; /* where images go */
+    const char *const *page_names;   /* [page_count], UTF-8, as file names may be: part of image names, and of
+                                        their files. NULL, and NULL names: numbers */
     size_t page_count;
-    const vsh_attribute
-        *attributes; /* [attribute_count]: provenance, in the extras of the document's asset, replacing
-                        earlier ones that begin with "vdbshade_"; comments of an .obj */
+    /* [attribute_count]: provenance, in the extras of the document's asset, replacing earlier ones that begin
+     * with "vdbshade_"; comments of an .obj */
+    const vsh_attribute *attributes;
     size_t attribute_count;
 } vsh_lit_options;
 

@@ -75,16 +75,16 @@ VSH_API void vsh_voxels_get_info(const vsh_voxels *voxels, vsh_voxels_info *info
 typedef struct vsh_volume vsh_volume;
 
 /* Voxels whose centre lies inside a solid. */
-enum {
+typedef enum vsh_inside {
     VSH_INSIDE_NEAREST = 0, /* up to four voxels deep, take the value of the nearest shaded voxel, so that
                                interpolation at the surface does not darken; deeper ones are inactive */
     VSH_INSIDE_OFF = 1      /* inactive, background */
-};
+} vsh_inside;
 
 /* How voxels are shaded. */
 typedef struct vsh_volume_options {
     size_t struct_size;
-    int32_t inside; /* VSH_INSIDE_… */
+    vsh_inside inside; /* what becomes of voxels inside solids */
     int32_t ao; /* nonzero: AO within shade.ao_distance. In free space it is the open share of all directions
                    (the ambient light of a fog), by cones or rays over the sphere; not by VSH_AO_TAPS, nor
                    with layers of heights and spheres */

@@ -72,8 +72,8 @@ static const char *const *const tables[] = {
 };
 enum { TABLES = sizeof tables / sizeof tables[0] };
 
-const char *vsh_get_name(int32_t kind, int32_t value) {
-    const char *const *name = kind >= 0 && kind < TABLES ? tables[kind] : NULL;
+const char *vsh_get_name(vsh_names kind, int32_t value) {
+    const char *const *name = (uint32_t)kind < TABLES ? tables[kind] : NULL;
     for (; name != NULL && *name != NULL; ++name, --value) {
         if (value == 0) {
             return *name;
@@ -82,7 +82,7 @@ const char *vsh_get_name(int32_t kind, int32_t value) {
     return NULL;
 }
 
-int32_t vsh_find_name(int32_t kind, const char *name) {
+int32_t vsh_find_name(vsh_names kind, const char *name) {
     const char *known;
     for (int32_t i = 0; name != NULL && (known = vsh_get_name(kind, i)) != NULL; ++i) {
         if (strcmp(known, name) == 0) {

@@ -25,7 +25,7 @@ typedef struct flat_work {
     size_t file_count;
     const char *
         *names; /* [plane_count], as the next two: irradiance.R, .G and .B, then the shadows, then A */
-    int32_t *holds;
+    vsh_channel_kind *holds;
     float **planes; /* in one piece of memory */
     size_t plane_count;
     vsh_image image;

@@ -73,7 +73,7 @@ int cli_apply_settings(int32_t owner, void *target) {
         scene->solidity_count = cli_parsed.rule_count;
     }
     for (size_t i = 0; cli_setting(i) != NULL; ++i) {
-        if (cli_parsed.settings[i] != NULL && cli_setting(i)->owner == owner) {
+        if (cli_parsed.settings[i] != NULL && cli_setting(i)->owner == (vsh_setting_owner)owner) {
             CLI_TRY(set(cli_setting(i), cli_parsed.settings[i], target));
         }
     }
@@ -103,8 +103,9 @@ size_t cli_list_options(const cli_command *command, cli_option options[CLI_MOST_
         }
         const vsh_setting *setting;
         for (size_t k = 0; (setting = cli_setting(k)) != NULL; ++k) {
-            const bool wanted = row->kind == CLI_KIND_SETTING ? strcmp(setting->option, row->name) == 0
-                                                              : setting->group == (int32_t)row->place;
+            const bool wanted = row->kind == CLI_KIND_SETTING
+                                    ? strcmp(setting->option, row->name) == 0
+                                    : setting->group == (vsh_setting_topic)row->place;
             if (wanted && find_option(options, count, setting->option, 0) == NULL) {
                 options[count++] = (cli_option){
                     setting->option, setting->value[0] != '\0' ? setting->value : NULL,

@@ -450,7 +450,7 @@ static vsh_result check_options(const vsh_flat_options *o, vsh_error *error) {
         int32_t value, least, most;
     } integers[] = {{"width", o->width, 1, MAX_SIZE},
                     {"height", o->height, 1, MAX_SIZE},
-                    {"method", o->method, 0, VSH_FLAT_EXACT},
+                    {"method", (int32_t)o->method, 0, VSH_FLAT_EXACT},
                     {"supersample", o->supersample, 1, MAX_SUPERSAMPLE},
                     {"padding", o->padding, 0, VSHI_MAX_PADDING},
                     {"max_steps", o->max_steps, 16, 65536}};

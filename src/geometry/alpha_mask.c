@@ -17,7 +17,7 @@ vsh_result vshi_alpha_mask_check(const vsh_mesh *mesh, size_t index, vsh_error *
                 mask->height < LARGEST && mask->alpha_cutoff >= 0.0 && mask->base_alpha >= 0.0 &&
                 mask->base_alpha <= 1.0;
     for (int k = 0; k < 2; ++k) {
-        good = good && mask->wrap[k] >= VSH_WRAP_REPEAT && mask->wrap[k] <= VSH_WRAP_CLAMP;
+        good = good && (uint32_t)mask->wrap[k] <= VSH_WRAP_CLAMP;
     }
     for (int k = 0; k < 6; ++k) {
         good = good && isfinite(mask->uv_transform[k]);

@@ -235,7 +235,7 @@ static vsh_result check_operands(const vsh_sdf *sdf, size_t index, int32_t *dept
 static vsh_result check_tree(const vsh_sdf *sdf, int32_t *depth, vsh_error *error) {
     for (size_t i = 0; i < sdf->node_count; ++i) {
         const vsh_sdf_node *node = &sdf->nodes[i];
-        if (node->shape < 0 || node->shape >= SHAPE_COUNT) {
+        if ((uint32_t)node->shape >= SHAPE_COUNT) {
             return vshi_fail(error, VSH_ERROR_INPUT, "sdf node %zu: shape %d: expected 0 … %d", i,
                              node->shape, SHAPE_COUNT - 1);
         }

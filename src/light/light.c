@@ -214,7 +214,7 @@ vsh_result vsh_light_check(const vsh_light *light, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': type %d is out of range 0 … %d", light->name,
                          light->type, TYPES - 1);
     }
-    if (light->falloff < VSH_FALLOFF_NONE || light->falloff > VSH_FALLOFF_QUADRATIC) {
+    if ((uint32_t)light->falloff > VSH_FALLOFF_QUADRATIC) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "light '%s': falloff %d is out of range 0 … %d",
                          light->name, light->falloff, VSH_FALLOFF_QUADRATIC);
     }

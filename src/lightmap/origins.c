@@ -259,7 +259,7 @@ vshi_placement vshi_placement_open(const vsh_occluders *occluders, const vsh_sha
               (lights && !vshi_shadow_traces(options, occluders->triangles)) || (ao && marches_ao));
     for (size_t i = 0; i < occluders->layer_count; ++i) {
         const vshi_layer *layer = &occluders->layers[i];
-        own.method = layer->method < 0 ? options->method : layer->method;
+        own.method = layer->method == VSH_SHADOW_OF_SCENE ? options->method : layer->method;
         if (layer->field != NULL) {
             const bool shades = lights && !vshi_layer_is_closed(layer), occludes = ao && layer->ao != 0;
             add_field(&p, layer->field, layer->triangles,

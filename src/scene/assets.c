@@ -467,7 +467,7 @@ static vsh_result place_caster(vsh_assets *assets, const vsh_scene *scene, size_
     if (caster->type == VSH_CASTER_SDF) {
         return VSH_OK;
     }
-    if (caster->type < VSH_CASTER_MESH || caster->type > VSH_CASTER_TEXT) {
+    if ((uint32_t)caster->type > VSH_CASTER_TEXT) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "caster %zu: type %d: expected 0 … %d", index,
                          caster->type, VSH_CASTER_TEXT);
     }
@@ -567,8 +567,7 @@ static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count,
         const vsh_solidity_rule *rule = &rules[r];
         const vshi_asset_file *first = NULL;
         bool matched = false;
-        if (rule->pattern == NULL || rule->solidity < VSH_SOLIDITY_AUTO ||
-            rule->solidity > VSH_SOLIDITY_INWARD) {
+        if (rule->pattern == NULL || (uint32_t)rule->solidity > VSH_SOLIDITY_INWARD) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "rule of solidity %zu: %s", r,
                              rule->pattern == NULL ? "pattern is NULL"
                                                    : "solidity is none of VSH_SOLIDITY_…");

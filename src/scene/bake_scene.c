@@ -199,7 +199,7 @@ static vsh_result create_charts(const vsh_scene *scene, vshi_target *target, boo
     }
     options.ao_spacing = scene->ao || vshi_planes_shaded(&scene->planes) > 0 ? receiver->ao_spacing : 1;
     options.shade = scene->shade;
-    options.tangents = scene->bent == 1 + VSH_BENT_TANGENT;
+    options.tangents = scene->bent == VSH_BENT_TANGENT;
     vsh_run silent = *run;
     silent.warning = NULL; /* vshi_warn_uvs() names the file, too */
     vsh_charts_info info;

@@ -76,7 +76,7 @@ typedef struct vshi_channels {
     vsh_lightmap lightmap; /* the values, as the bake takes them */
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;
-    int32_t *holds;
+    vsh_channel_kind *holds;
     float **values;     /* [value_count]: [height][width][components] of the store */
     size_t *components; /* [value_count]: 1 or 3 channels each */
     size_t value_count;

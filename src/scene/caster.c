@@ -199,20 +199,17 @@ static vsh_result add_node(vshi_json *reader, const vshi_value *value, tree *t, 
     return VSH_OK;
 }
 
-static vsh_result read_kind(vshi_json *reader, const vshi_value *value, int32_t *shape) {
+static vsh_result read_kind(vshi_json *reader, const vshi_value *value, vsh_sdf_shape *shape) {
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     VSHI_TRY(vshi_reject_both(reader, value, "shape", "op"));
-    int32_t operation = -1;
-    *shape = -1;
-    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = shape_name}, shape));
+    int32_t operation = -1, plain = -1;
+    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = shape_name}, &plain));
     VSHI_TRY(
         vshi_read_choice(reader, value, &(vshi_key){.name = "op", .name_of = operation_name}, &operation));
-    if (operation >= 0) {
-        *shape = VSH_SDF_UNION + operation;
-    }
-    if (*shape < 0) {
+    if (operation < 0 && plain < 0) {
         return vshi_json_fail(reader, value, "key \"shape\" or \"op\" is missing");
     }
+    *shape = operation >= 0 ? VSH_SDF_UNION + operation : plain;
     return VSH_OK;
 }
 
@@ -497,12 +494,14 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
     *caster = vsh_caster_default();
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     vshi_value transform;
-    VSHI_TRY(vshi_read_type(reader, value, keys, sizeof keys / sizeof keys[0], &caster->type));
+    int32_t type;
+    VSHI_TRY(vshi_read_type(reader, value, keys, sizeof keys / sizeof keys[0], &type));
+    caster->type = type;
     /* keys are checked even without a type, whose name may be misspelt */
-    const uint32_t variant = caster->type < 0 ? VSHI_ALL : 1U << caster->type;
-    VSHI_TRY(vshi_read_object(reader, value, &caster_table, variant,
-                              caster->type < 0 ? "a caster" : whats[caster->type], caster));
-    if (caster->type < 0) {
+    const uint32_t variant = type < 0 ? VSHI_ALL : 1U << type;
+    VSHI_TRY(
+        vshi_read_object(reader, value, &caster_table, variant, type < 0 ? "a caster" : whats[type], caster));
+    if (type < 0) {
         return vshi_json_fail(reader, value,
                               "key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" "
                               "or \"text\" is missing");

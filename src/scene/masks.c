@@ -51,7 +51,7 @@ typedef struct shape {
 
 typedef struct texture {
     const void *of;  /* vshi_material.image or .image_path */
-    int32_t channel; /* VSH_MASK_CHANNEL_… */
+    int32_t channel; /* VSHI_MASK_CHANNEL_… */
     uint8_t *alpha;  /* NULL: it has none, or could not be read */
     int32_t width, height;
     bool binary; /* nearly all of it is clear or opaque, and there is some of both */
@@ -193,13 +193,13 @@ static alpha_source find_source(const vsh_image *image, int32_t channel, size_t 
                                      vshi_image_find_plane(image, "B")},
                                     {0.2126f, 0.7152f, 0.0722f}};
     alpha_source one = {{NULL}, {1.0f, 0.0f, 0.0f}};
-    if (channel <= VSH_MASK_CHANNEL_BLUE || channel == VSH_MASK_CHANNEL_AUTO) {
-        one.planes[0] = vshi_image_find_plane(image, names[channel <= VSH_MASK_CHANNEL_BLUE ? channel : 0]);
+    if (channel <= VSHI_MASK_CHANNEL_BLUE || channel == VSHI_MASK_CHANNEL_AUTO) {
+        one.planes[0] = vshi_image_find_plane(image, names[channel <= VSHI_MASK_CHANNEL_BLUE ? channel : 0]);
     }
-    if (channel == VSH_MASK_CHANNEL_ALPHA || (channel == VSH_MASK_CHANNEL_AUTO && varies(&one, texels))) {
+    if (channel == VSHI_MASK_CHANNEL_ALPHA || (channel == VSHI_MASK_CHANNEL_AUTO && varies(&one, texels))) {
         return one;
     }
-    one.planes[0] = one.planes[0] != NULL && channel != VSH_MASK_CHANNEL_AUTO ? one.planes[0] : grey;
+    one.planes[0] = one.planes[0] != NULL && channel != VSHI_MASK_CHANNEL_AUTO ? one.planes[0] : grey;
     return one.planes[0] != NULL ? one : luminance;
 }
 

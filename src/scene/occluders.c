@@ -35,7 +35,7 @@ static const vsh_scene_layer *find_layer(const vsh_scene *scene, const vsh_caste
 }
 
 static int32_t find_method(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    return layer != NULL && layer->method >= 0 ? layer->method : scene->shade.method;
+    return layer != NULL && layer->method != VSH_SHADOW_OF_SCENE ? layer->method : scene->shade.method;
 }
 
 static bool bakes_ao(const vsh_scene *scene) {

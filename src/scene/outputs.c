@@ -199,7 +199,7 @@ static bool is_asked(const vshi_plane_kind *kind, const vsh_scene *scene) {
         {offsetof(vsh_lightmap, shadow_error), scene->error && shadow_error},
         {offsetof(vsh_lightmap, ao_error), scene->error && scene->ao && ao_error},
         {offsetof(vsh_lightmap, irradiance), scene->irradiance != 0},
-        {offsetof(vsh_lightmap, bent), scene->bent != 0},
+        {offsetof(vsh_lightmap, bent), scene->bent != VSH_BENT_NONE},
         {offsetof(vsh_lightmap, tint), scene->tint.type != VSH_TINT_NONE},
         {offsetof(vsh_lightmap, coverage), true},
     };
@@ -234,9 +234,9 @@ static size_t name_value(const vshi_plane_kind *kind, const vsh_light *light,
 
 vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t height, vshi_channels *channels,
                               vsh_error *error) {
-    static const int32_t holds[] = {[VSHI_HOLDS_DATA] = VSH_CHANNEL_DATA,
-                                    [VSHI_HOLDS_LIGHT] = VSH_CHANNEL_LIGHT,
-                                    [VSHI_HOLDS_VECTOR] = VSH_CHANNEL_VECTOR};
+    static const vsh_channel_kind holds[] = {[VSHI_HOLDS_DATA] = VSH_CHANNEL_DATA,
+                                             [VSHI_HOLDS_LIGHT] = VSH_CHANNEL_LIGHT,
+                                             [VSHI_HOLDS_VECTOR] = VSH_CHANNEL_VECTOR};
     memset(channels, 0, sizeof *channels);
     size_t kind_count, count = 0;
     const vshi_plane_kind *kinds = vshi_plane_kinds(&kind_count);
@@ -283,7 +283,7 @@ static void bind_planes(vsh_lightmap *lightmap, const vsh_scene *scene, float *c
         }
         values = values != NULL ? values + count : NULL;
     }
-    lightmap->bent_space = scene->bent > 0 ? scene->bent - 1 : VSH_BENT_WORLD;
+    lightmap->bent_space = scene->bent != VSH_BENT_NONE ? scene->bent : VSH_BENT_WORLD;
     lightmap->asked = scene->planes;
 }
 

@@ -206,8 +206,9 @@ static vsh_result read_receiver(vshi_json *reader, const vshi_value *value, void
     vshi_value given;
     *receiver = vsh_receiver_default();
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    VSHI_TRY(vshi_read_type(reader, value, keys, 3, &receiver->type));
-    receiver->type = receiver->type < 0 ? VSH_RECEIVER_MESH : receiver->type;
+    int32_t type;
+    VSHI_TRY(vshi_read_type(reader, value, keys, 3, &type));
+    receiver->type = type < 0 ? VSH_RECEIVER_MESH : type;
     VSHI_TRY(vshi_read_object(reader, value, &receiver_table, 1U << receiver->type, whats[receiver->type],
                               receiver));
     return vshi_member(value, "plane", &given) ? read_plane(reader, &given, receiver) : VSH_OK;
@@ -296,11 +297,6 @@ static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, cons
     return result;
 }
 
-static void count_bent(void *target) {
-    vsh_scene *scene = target;
-    ++scene->bent; /* 0 is none */
-}
-
 #define AT(member) .offset = offsetof(vsh_scene, member)
 static const vshi_key ao_keys[] = {
     VSHI_KEY("distance", NUMBER, AT(shade.ao_distance), .required = VSHI_ALL, .lowest = VSHI_SMALLEST_LENGTH,
@@ -313,7 +309,6 @@ static const vshi_key ao_keys[] = {
              .variants = 1U << VSH_AO_CONES | 1U << VSH_AO_ADAPTIVE | 1U << VSH_AO_EXACT | 1U << VSH_AO_AUTO,
              .lowest = 1.0, .highest = 256.0),
     VSHI_KEY("bent_normals", NAME, AT(bent), .variants = ~(1U << VSH_AO_TAPS), .names = VSH_NAMES_BENT,
-             .then = count_bent,
              VSHI_OPTION("bent-normals", "SPACE", CHANNELS,
                          "with --ao also bent.X, .Y, .Z: the mean open direction, in world or tangent space",
                          .otherwise = "none")),
@@ -324,12 +319,12 @@ static vsh_result read_ao(vshi_json *reader, const vshi_value *value, void *memb
     static const char *const whats[] = {
         [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_AUTO] = NULL};
     vsh_scene *scene = member;
+    int32_t method = scene->shade.ao_method;
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "method", .names = VSH_NAMES_AO},
-                              &scene->shade.ao_method));
-    const char *what = whats[scene->shade.ao_method];
-    return vshi_read_object(reader, value, &vshi_ao_table, 1U << scene->shade.ao_method,
-                            what != NULL ? what : "ao", scene);
+    VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "method", .names = VSH_NAMES_AO}, &method));
+    scene->shade.ao_method = method;
+    const char *what = whats[method];
+    return vshi_read_object(reader, value, &vshi_ao_table, 1U << method, what != NULL ? what : "ao", scene);
 }
 
 /* "quadratic", or the powers of R, G and B. */

@@ -78,7 +78,7 @@ static vsh_result prepare(prepared *item, size_t index, double lifted, const vsh
     const vshi_layer *layer = &item->layer;
     const vsh_occluders own = {.field = layer->field, .triangles = layer->triangles, .lifted = lifted};
     options.start_offset = layer->start_offset < 0.0 ? options.start_offset : layer->start_offset;
-    options.method = layer->method < 0 ? options.method : layer->method;
+    options.method = layer->method == VSH_SHADOW_OF_SCENE ? options.method : layer->method;
     if (light == NULL) {
         return vshi_ao_prepare(&own, &options, sphere, &item->ao, error);
     }

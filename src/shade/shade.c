@@ -60,14 +60,14 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
     VSHI_TRY(vshi_options_resolve(options, full, sizeof *full, "vsh_shade_options", error));
     const vshi_range ranges[] = {
         {"method", full->method, VSH_SHADOW_HARD, VSH_SHADOW_AUTO},
-        {"ao_method", full->ao_method, VSH_AO_TAPS, VSH_AO_AUTO},
+        {"ao_method", (int32_t)full->ao_method, VSH_AO_TAPS, VSH_AO_AUTO},
         {"ao_cones", full->ao_cones, 1, 256},
         {"max_steps", full->max_steps, 16, 65536},
         {"ao_distance", full->ao_distance, 0x1p-1000, 0x1p1000},
         {"start_offset", full->start_offset, 0, 16},
         {"surface_offset", full->surface_offset, 0, 0x1p1000},
         {"rays", full->rays, 0, 4096},
-        {"sampler", full->sampler, VSH_SAMPLER_SOBOL, VSH_SAMPLER_BLUE},
+        {"sampler", (int32_t)full->sampler, VSH_SAMPLER_SOBOL, VSH_SAMPLER_BLUE},
         {"frame", full->frame, 0, INT32_MAX},
         {"early_rays", full->early_rays, 0, 4096},
         {"max_error", full->max_error, 1e-4, 1},
@@ -295,7 +295,7 @@ static void tint_one(const vsh_tint *tint, double v, double rgb[3]) {
 vsh_result vshi_tint_check(const vsh_tint *tint, vsh_error *error) {
     VSHI_NEEDS(tint);
     const vshi_range ranges[] = {
-        {"tint: type", tint->type, VSH_TINT_NONE, VSH_TINT_POWER},
+        {"tint: type", (int32_t)tint->type, VSH_TINT_NONE, VSH_TINT_POWER},
         {"tint: power[0]", tint->power[0], 0.0625, 16.0},
         {"tint: power[1]", tint->power[1], 0.0625, 16.0},
         {"tint: power[2]", tint->power[2], 0.0625, 16.0},

@@ -179,7 +179,7 @@ static vsh_result allocate(const char *name, int32_t what, vshi_terrain grid, vs
 static vsh_result check(const char *name, int32_t what, vshi_terrain grid, const vsh_run *run,
                         vsh_error *error) {
     if (what != VSH_HEIGHTS_SOLID && what != VSH_HEIGHTS_SURFACE) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: what %d is none of VSH_HEIGHTS_…", name, what);
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: part %d is none of VSH_HEIGHTS_…", name, what);
     }
     const size_t samples = grid.columns * grid.rows, edge = vshi_terrain_edge_length(grid);
     if (samples + edge + 1 > UINT32_MAX) {
@@ -251,14 +251,14 @@ done:
     return result;
 }
 
-vsh_result vsh_model_from_heights(const vsh_heights_source *source, int32_t what, const vsh_run *run,
+vsh_result vsh_model_from_heights(const vsh_heights_source *source, vsh_heights_part part, const vsh_run *run,
                                   vsh_model **model, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(model);
     *model = NULL;
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
-    return vshi_model_of_heights(source, what, NULL, &full, model, error);
+    return vshi_model_of_heights(source, part, NULL, &full, model, error);
 }
 
 /* --- images */

@@ -132,7 +132,7 @@ vsh_result fuzz_check(vsh_result result, const void *place) {
     void *handle;
     memcpy(&handle, place, sizeof handle);
     if (result == VSH_OK) {
-        if (error.code != -1 || handle == NULL) {
+        if ((int32_t)error.code != -1 || handle == NULL) {
             fail("success", handle == NULL ? "without a handle" : "with an error");
         }
         return result;

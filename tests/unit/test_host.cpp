@@ -74,7 +74,7 @@ Outcome work(int32_t threads = 0) {
         const vsh_points points = {COUNT, positions.data(), normals.data(), nullptr};
         vsh_shade_options options = scene->shade;
         options.rays = 16;
-        for (const int32_t method : {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE}) {
+        for (const vsh_shadow_method method : {VSH_SHADOW_CONE, VSH_SHADOW_ADAPTIVE}) {
             options.method = method;
             o.check(vsh_shade_shadow(occluders, &points, &scene->lights[0], &options, &run, values.data(),
                                      nullptr, nullptr, &error),

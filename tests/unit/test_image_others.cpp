@@ -20,7 +20,7 @@ constexpr int WIDTH = 37, HEIGHT = 50; // several chunks of EXR, the last cut
 constexpr size_t TEXELS = WIDTH * HEIGHT;
 
 // Writes an image of these channels; `value` is that of a channel's texel.
-void write(const std::string &path, const std::vector<const char *> &names, const int32_t *holds,
+void write(const std::string &path, const std::vector<const char *> &names, const vsh_channel_kind *holds,
            float (*value)(size_t channel, size_t texel), const vsh_image_options &options) {
     std::vector<std::vector<float>> planes(names.size(), std::vector<float>(TEXELS));
     std::vector<const float *> views;
@@ -201,8 +201,8 @@ struct Asked {
     std::vector<const char *> names;
     const char *pack = nullptr;
     int32_t bits = 8;
-    std::vector<int32_t> holds = {}; // none: data
-    int32_t color_space = VSH_COLOR_AUTO;
+    std::vector<vsh_channel_kind> holds = {}; // none: data
+    vsh_color_space color_space = VSH_COLOR_AUTO;
     std::vector<vsh_attribute> attributes = {};
 };
 
@@ -295,12 +295,13 @@ TEST(values_are_those_that_were_given) {
 // The kind of a channel, not its name, decides how it is coded; alpha is linear. Programs would undo a gamma
 // chunk, or one of colours, in data.
 TEST(light_is_srgb_and_says_so_and_all_else_is_linear_unless_a_space_is_named) {
-    const std::vector<int32_t> light = {VSH_CHANNEL_DATA, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT,
-                                        VSH_CHANNEL_LIGHT, VSH_CHANNEL_DATA};
+    const std::vector<vsh_channel_kind> light = {VSH_CHANNEL_DATA, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT,
+                                                 VSH_CHANNEL_LIGHT, VSH_CHANNEL_DATA};
     const struct {
-        std::vector<int32_t> holds;
+        std::vector<vsh_channel_kind> holds;
         const char *pack;
-        int32_t bits, space;
+        int32_t bits;
+        vsh_color_space space;
         int from; // the channel of the image in R
         double (*curve)(double);
         const char *said;

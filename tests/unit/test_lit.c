@@ -592,7 +592,7 @@ static void light_file(const char *in, int purposes, uint32_t pages, int32_t pla
     lit[0].page = pages - 1;
     vsh_lit_image images[4];
     size_t count = 0;
-    for (int purpose = 0; purpose < VSH_LIT_PURPOSES; ++purpose) {
+    for (int purpose = 0; purpose <= VSH_LIT_PREVIEW; ++purpose) {
         for (uint32_t page = 0; page < pages && (purposes >> purpose & 1) != 0; ++page) {
             images[count++] = white_image(purpose, page);
         }

@@ -171,7 +171,7 @@ TEST(images_out_of_range_are_refused) {
     FREED_BY(end_lighting) lighting l = begin_sound();
     const vsh_lit_image white = white_image(0, 0),
                         bad[][2] = {
-                            {white_image(VSH_LIT_PURPOSES, 0)},
+                            {white_image(VSH_LIT_PREVIEW + 1, 0)},
                             {white_image(-1, 0)},
                             {white_image(0, UINT16_MAX)},
                             {{.png = old_output, .png_size = sizeof old_output}},

@@ -60,7 +60,7 @@ static void fill_traced(case_scene *c, char wall[300]) {
     c->caster.transform[7] = 0.0;
     c->receiver.ao_spacing = 2;
     c->scene.irradiance = true;
-    c->scene.bent = 1 + VSH_BENT_TANGENT;
+    c->scene.bent = VSH_BENT_TANGENT;
     c->scene.planes.sky = VSH_UP_Y;
     c->scene.error = 1;
     c->scene.shade.method = VSH_SHADOW_EXACT;

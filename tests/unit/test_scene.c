@@ -122,7 +122,8 @@ TEST(every_key_lands_in_its_field) {
     assert_int_equal(c[5].letters.align, VSH_ALIGN_RIGHT);
 
     static const struct {
-        int32_t shape, left, right;
+        vsh_sdf_shape shape;
+        int32_t left, right;
     } expected[] = {{VSH_SDF_CAPSULE, -1, -1}, {VSH_SDF_CYLINDER, -1, -1},   {VSH_SDF_SMOOTH_UNION, 0, 1},
                     {VSH_SDF_CONE, -1, -1},    {VSH_SDF_SMOOTH_UNION, 2, 3}, {VSH_SDF_CONE, -1, -1},
                     {VSH_SDF_BOX, -1, -1},     {VSH_SDF_INTERSECTION, 5, 6}, {VSH_SDF_SUBTRACTION, 4, 7}};

@@ -22,7 +22,7 @@ TEST(a_setting_goes_where_the_file_would_put_it) {
     assert_true(scene.shade.max_error == 5e-3 && scene.shade.ao_distance == 0.5 && scene.unit == 0.01);
     assert_true(scene.ao && scene.error && scene.irradiance && scene.has_ambient);
     assert_int_equal(scene.shade.ao_method, VSH_AO_CONES);
-    assert_int_equal(scene.bent, 1 + VSH_BENT_TANGENT);
+    assert_int_equal(scene.bent, VSH_BENT_TANGENT);
     assert_true(scene.ambient[0] == 0.0 && scene.ambient[1] == 0.25 && scene.ambient[2] == 1.0);
     assert_true(scene.tint.type == VSH_TINT_POWER && scene.tint.power[2] == 1.5);
     takes(&scene, "irradiance", "false");

@@ -182,10 +182,11 @@ static inline float cast_kind_at(const casting *c, int kind, const vsh_light *li
 /* With options of the test's own, but for the method. */
 static inline void shade_kind(const casting *c, int kind, const vsh_light *light, vsh_shade_options options,
                               const vsh_points *points, float *values) {
-    *(is_ao(kind) ? &options.ao_method : &options.method) = is_ao(kind) ? kind - SHADOW_METHODS : kind;
     if (is_ao(kind)) {
+        options.ao_method = kind - SHADOW_METHODS;
         shade_ao_points(occluders_of_caster(c), points, &options, NULL, values, NULL);
     } else {
+        options.method = kind;
         shade_points(occluders_of_caster(c), points, light, &options, NULL, values, NULL);
     }
 }

@@ -1,6 +1,6 @@
 """Generates modules for `import vdbshade` from the public headers: generate.py INCLUDE_FOLDER BINDINGS_H OUTPUT_FOLDER
 
-_abi.py: declarations, also those of bindings.h, compiled by cffi, so that importing parses nothing; _tables.py: words for constants; types.py: options and
+_abi.py: declarations, also those of bindings.h, compiled by cffi, so that importing parses nothing; _version.py; types.py: options and
 records, with the headers' comments."""
 import contextlib
 import keyword
@@ -18,14 +18,6 @@ ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, 
              "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"}}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 
-# Prefixes of members whose comments do not name one.
-MORE_WORDS = {("vsh_lightmap_options", "padding"): "VSH_PADDING_", ("vsh_receiver", "padding"): "VSH_PADDING_",
-              ("vsh_planes", "sky"): "VSH_UP_", ("vsh_run", "isa"): "VSH_ISA_", ("vsh_receiver", "seams"): "VSH_SEAMS_",
-              ("vsh_receiver", "type"): "VSH_RECEIVER_", ("vsh_receiver", "unwrap"): "VSH_RECEIVER_UNWRAP_",
-              ("vsh_lit_image", "purpose"): "VSH_LIT_", ("vsh_unwrap_options", "keep_uvs"): "VSH_UNWRAP_"}
-# Prefixes of functions' arguments, and constants that are no words.
-OTHER_WORDS = ["VSH_ERROR_", "VSH_MEASURE_", "VSH_CONFINED_", "VSH_HEIGHTS_", "VSH_CHANNEL_", "VSH_METHOD_", "VSH_BENT_"]
-COUNTS = {"VSH_MEASURE_COUNT", "VSH_LIT_PURPOSES", "VSH_CONFINED_ALL", "VSH_OK"}
 # Structs without a size that are filled by keywords.
 FILLED = {"vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes",
           "vsh_selection"}
@@ -85,18 +77,9 @@ def functions(text):
     return list(dict.fromkeys(re.findall(r"VSH_API[^;{]*?\b(vsh_\w+)\(", COMMENT.sub(" ", text))))
 
 
-def enumerations(text):
-    """Each enum of the headers: its constants by their names, and the numbers that they stand for."""
-    constants, blocks = {}, []
-    for body in re.findall(r"^enum \{(.*?)\};", COMMENT.sub(" ", text), re.S | re.M):
-        number, block = -1, {}
-        for entry in filter(None, (part.strip() for part in body.split(","))):
-            name, _, given = entry.partition("=")
-            number = eval(given.strip(), {}, constants) if given.strip() else number + 1  # our own headers' numbers
-            block[name.strip()] = number
-            constants.update(block)
-        blocks.append(block)
-    return blocks
+def enums(text):
+    """Names of the enums, whose constants Python gives as words."""
+    return set(re.findall(r"^typedef enum (\w+) \{", text, re.M))
 
 
 def _words(comment):
@@ -110,16 +93,21 @@ def structs(text):
     for match in re.finditer(r"^typedef struct (\w+) \{\n(.*?)^\} \1;", text, re.S | re.M):
         members = []
         body = re.sub(r"\(\*(\w+)\)\(.*?\);", r"\1_callback \1;", match[2], flags=re.S)
+        above = ""
         for part in re.finditer(r"(?P<declared>[a-z_][^;/]*);|(?P<comment>/\*.*?\*/)", body, re.S):
             if part["comment"]:
-                if members and not members[-1].comment:
-                    members[-1].comment = " ".join(_words(part["comment"]))
+                comment = " ".join(_words(part["comment"]))
+                if not body[: part.start()].rpartition("\n")[2].strip():
+                    above = comment
+                elif members and not members[-1].comment:
+                    members[-1].comment = comment
                 continue
             kind = ""
             for name in part["declared"].split(","):
                 first = re.match(r"(.*?)(\w+)((?:\[\w+\])*)$", name.strip(), re.S)
                 kind = " ".join(first[1].split()) or kind
-                members.append(Member(first[2], kind, re.findall(r"\w+", first[3]), ""))
+                members.append(Member(first[2], kind, re.findall(r"\w+", first[3]), above))
+            above = ""
         found[match[1]] = members
     return found
 
@@ -127,26 +115,13 @@ def structs(text):
 # --- the modules
 
 
-def words_of(text):
-    """{(struct, member): prefix} of members that are given as words: those with VSH_PREFIX_… in their comments, and MORE_WORDS."""
-    found = {}
-    for struct, members in structs(text).items():
-        for member in members:
-            match = re.search(r"(VSH_[A-Z_]+_)…(?! \+)", member.comment)
-            if match and member.type == "int32_t" and "bits" not in member.comment:
-                found[struct, member.name] = match[1]
-    found.update(MORE_WORDS)
-    del found["vsh_flat_caster", "type"]  # only in files; the enum of this prefix has methods
-    return found
-
-
 def camel(struct):
     return "".join(word.capitalize() for word in struct[len("vsh_") :].split("_"))
 
 
-def hint(member, words, known):
+def hint(member, known, kinds):
     """The Python type of a member."""
-    if words:
+    if member.type.replace("const ", "").rstrip(" *") in kinds or member.name == "padding":
         return "Union[str, int]"
     if member.type in ("const char *", "char"):
         return "str"
@@ -187,12 +162,12 @@ def is_options(name, members):
 
 
 def write_types(path, text):
-    found, words = structs(text), words_of(text)
+    found, kinds = structs(text), enums(text)
     texts = [RECORD]
     for struct, members in found.items():
         base = "typing.TypedDict, total=False" if is_options(struct, members) else "Record"
         shown = [m for m in members if m.name not in HIDDEN | ARGUMENTS.get(struct, set())]
-        hints = [hint(m, words.get((struct, m.name)), found) for m in shown]
+        hints = [hint(m, found, kinds) for m in shown]
         texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the ', "", "    Attributes", "    ----------"]
         for member, kind in zip(shown, hints):
             texts.append(f"    {member.name} : {kind}")
@@ -204,21 +179,9 @@ def write_types(path, text):
     path.write_text("\n".join(texts), encoding="utf-8")
 
 
-def table(prefix, text):
-    """The words of an enum all of whose constants begin so."""
-    for block in enumerations(text):
-        if all(name.startswith(prefix) or name == "VSH_OK" for name in block):
-            return {name[len(prefix) :].lower(): number for name, number in block.items() if name not in COUNTS}
-    raise SystemExit(f"generate.py: no enum of constants {prefix}…")
-
-
-def write_tables(path, text):
-    members = {f"{struct}.{member}": prefix for (struct, member), prefix in sorted(words_of(text).items())}
-    words = {prefix: table(prefix, text) for prefix in sorted({*members.values(), *OTHER_WORDS})}
+def write_version(path, text):
     version = ".".join(re.findall(r"#define VSH_VERSION_(?:MAJOR|MINOR) (\d+)", text))
-    lines = ['"""Made from the public headers when vdbshade is built: words for constants."""', f"WORDS = {words!r}",
-             f"MEMBERS = {members!r}", f"VERSION = {version!r}"]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(f'"""Made from the public headers when vdbshade is built."""\nVERSION = {version!r}\n', encoding="utf-8")
 
 
 def main(include, bindings, output):
@@ -231,7 +194,7 @@ def main(include, bindings, output):
     with contextlib.redirect_stdout(None):
         ffi.emit_python_code(str(output / "_abi.py"))
     (output / "_abi.py").touch()  # which it leaves alone where nothing has changed
-    write_tables(output / "_tables.py", text)
+    write_version(output / "_version.py", text)
     write_types(output / "types.py", text)
 
 

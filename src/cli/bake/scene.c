@@ -327,9 +327,10 @@ static int keep_error(vsh_scene *scene) {
 static int check_shade(const cli_bake_settings *s, vsh_scene *scene) {
     CLI_REFUSE_IF(cli_was_given("ao-method") && !bakes_ao(scene), "--ao-method: needs --ao DISTANCE");
     scene->irradiance = scene->irradiance || cli_was_given("ambient");
-    CLI_REFUSE_IF(
-        scene->bent > 0 && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS), "--bent-normals: %s",
-        scene->ao ? "AO by taps has no directions; use --ao-method cones or rays" : "needs --ao DISTANCE");
+    CLI_REFUSE_IF(scene->bent != VSH_BENT_NONE && (!scene->ao || scene->shade.ao_method == VSH_AO_TAPS),
+                  "--bent-normals: %s",
+                  scene->ao ? "AO by taps has no directions; use --ao-method cones or rays"
+                            : "needs --ao DISTANCE");
     CLI_REFUSE_IF(scene->has_ambient && !scene->irradiance, "%s: \"ambient\" needs \"irradiance\": true",
                   s->input);
     CLI_TRY(cli_was_given("max-error") ? keep_error(scene) : CLI_OK);

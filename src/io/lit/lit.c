@@ -86,7 +86,7 @@ static vsh_result check_mesh(const vshi_lit_work *work, size_t index, vsh_error 
 
 static vsh_result check_image(const vsh_lit_image *image, size_t index, vsh_error *error) {
     static const unsigned char magic[8] = {0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
-    if (image->purpose < 0 || image->purpose >= VSH_LIT_PURPOSES || image->page >= UINT16_MAX ||
+    if ((uint32_t)image->purpose >= VSHI_LIT_PURPOSES || image->page >= UINT16_MAX ||
         !(image->intensity >= 0.0 && image->intensity < 1e30)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_image %zu: purpose %d, page %u, intensity %g",
                          index, image->purpose, image->page, image->intensity);
@@ -124,7 +124,7 @@ static bool is_file_name(const char *name) {
 static vsh_result check_images(const vsh_lit_options *options, vsh_error *error) {
     VSHI_NEEDS_OF(options->image_count, options->images);
     VSHI_NEEDS_OF(options->chart_count, options->chart_pages);
-    if (options->image_place < VSH_LIT_IMAGES_AUTO || options->image_place > VSH_LIT_IMAGES_BESIDE) {
+    if ((uint32_t)options->image_place > VSH_LIT_IMAGES_BESIDE) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_options.image_place is %d",
                          options->image_place);
     }

@@ -16,7 +16,7 @@
 
 enum { MARK_BYTES = VSHI_LIT_NAME_BYTES + 64 }; /* a purpose and a page's name */
 
-static const char *const purpose_names[VSH_LIT_PURPOSES] = {
+static const char *const purpose_names[VSHI_LIT_PURPOSES] = {
     [VSH_LIT_OCCLUSION] = "occlusion", [VSH_LIT_LIGHTMAP] = "lightmap", [VSH_LIT_PREVIEW] = "preview"};
 
 void vshi_lit_besides_free(vshi_lit_besides *besides) {

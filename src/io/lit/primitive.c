@@ -100,8 +100,8 @@ static bool is_texture_of(const json_t *info, size_t set) {
 }
 
 /* Whether `value`, or something in it but `without`, is a texture in the set. */
-static bool has_texture(json_t *value, size_t set, const json_t *const without[VSH_LIT_PURPOSES]) {
-    for (int i = 0; i < VSH_LIT_PURPOSES; ++i) {
+static bool has_texture(json_t *value, size_t set, const json_t *const without[VSHI_LIT_PURPOSES]) {
+    for (int i = 0; i < VSHI_LIT_PURPOSES; ++i) {
         if (value == without[i]) {
             return false;
         }
@@ -127,13 +127,13 @@ static bool is_shown(const vshi_lit_work *work, const json_t *owner, size_t set,
                            ? json_array_get(materials, (size_t)json_integer_value(number))
                            : NULL;
     const json_t *base = json_object_get(material, "pbrMetallicRoughness");
-    const json_t *without[VSH_LIT_PURPOSES] = {
+    const json_t *without[VSHI_LIT_PURPOSES] = {
         [VSH_LIT_OCCLUSION] = json_object_get(material, "occlusionTexture"),
         [VSH_LIT_LIGHTMAP] = vshi_gltf_extension(material, "MOZ_lightmap"),
         [VSH_LIT_PREVIEW] =
             vshi_lit_is_cut_by_texture(material) ? NULL : json_object_get(base, "baseColorTexture"),
     };
-    for (int i = 0; i < VSH_LIT_PURPOSES; ++i) {
+    for (int i = 0; i < VSHI_LIT_PURPOSES; ++i) {
         without[i] = (purposes >> i & 1) != 0 ? without[i] : NULL;
     }
     return material != NULL && has_texture(material, set, without);

@@ -67,10 +67,12 @@ typedef struct vshi_lit_uvs {
     bool *set;     /* [count] */
 } vshi_lit_uvs;
 
+enum { VSHI_LIT_PURPOSES = 3 }; /* of vsh_lit_purpose */
+
 /* The images of a page. */
 typedef struct vshi_lit_page_images {
-    size_t textures[VSH_LIT_PURPOSES]; /* 1 + the texture of each purpose; 0: none */
-    double intensity;                  /* of the lightmap */
+    size_t textures[VSHI_LIT_PURPOSES]; /* 1 + the texture of each purpose; 0: none */
+    double intensity;                   /* of the lightmap */
 } vshi_lit_page_images;
 
 typedef struct vshi_lit_work {

@@ -623,7 +623,7 @@ static vsh_result decode_material(decoding *t, vshi_model_material *material, vs
                    {values.uv_set, VSH_MAX_UV_SETS - 1},
                    {values.wrap[0], VSH_WRAP_CLAMP},
                    {values.wrap[1], VSH_WRAP_CLAMP},
-                   {values.image_channel, VSH_MASK_CHANNEL_AUTO},
+                   {values.image_channel, VSHI_MASK_CHANNEL_AUTO},
                    {values.by_texture, 1}};
     bool good = given->image <= t->model->image_count && are_within(&values.alpha_cutoff, 1, 0.0) &&
                 are_within(&values.base_alpha, 1, 0.0) && values.base_alpha <= 1.0 &&

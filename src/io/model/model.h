@@ -13,6 +13,16 @@ VSH_BEGIN_C
 /* Returns the metres in a unit, "m", "cm", "mm", "in" or "ft"; 0 for another name and NULL. */
 double vshi_find_unit(const char *name);
 
+/* The channel of an image that is a material's alpha. */
+typedef enum vshi_mask_channel {
+    VSHI_MASK_CHANNEL_ALPHA = 0, /* A; 1 if there is none */
+    VSHI_MASK_CHANNEL_RED = 1,
+    VSHI_MASK_CHANNEL_GREEN = 2,
+    VSHI_MASK_CHANNEL_BLUE = 3,
+    VSHI_MASK_CHANNEL_LUMINANCE = 4, /* 0.2126 R + 0.7152 G + 0.0722 B of stored values, or Y */
+    VSHI_MASK_CHANNEL_AUTO = 5       /* A if it is below 1 anywhere, else the luminance */
+} vshi_mask_channel;
+
 /* The part of a file's material that decides where light passes. Masked and blended materials have a texture;
  * masked ones let light pass where base_alpha × its alpha is below alpha_cutoff. */
 typedef struct vshi_material {
@@ -28,7 +38,7 @@ typedef struct vshi_material {
     size_t image_size;
     const char *image_path; /* a file instead, in the model's folder unless run->allow_outside; it may be
                                missing. NULL: none */
-    int32_t image_channel;  /* VSH_MASK_CHANNEL_… */
+    int32_t image_channel;  /* a vshi_mask_channel */
     int32_t by_texture;     /* 1: the format has no alpha mode (OBJ). base_alpha and the image blend it; it is
                                opaque if neither leaves anything out */
 } vshi_material;

@@ -91,7 +91,7 @@ vsh_result vshi_obj_material(vshi_obj *obj, const char *name, size_t size, size_
  * my leaf.png". */
 typedef struct vshi_mtl_map {
     vshi_token name;  /* of the file: all text after the options; text NULL: none */
-    int32_t channel;  /* VSH_MASK_CHANNEL_…: -imfchan */
+    int32_t channel;  /* VSHI_MASK_CHANNEL_…: -imfchan */
     bool clamp;       /* -clamp on */
     double offset[2]; /* -o: the texture is read at scale × uv + offset */
     double scale[2];  /* -s */

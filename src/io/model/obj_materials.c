@@ -39,11 +39,11 @@ static bool read_channel(vshi_token value, int32_t *channel) {
     static const struct {
         const char *word;
         int32_t channel;
-    } channels[] = {{"r", VSH_MASK_CHANNEL_RED},
-                    {"g", VSH_MASK_CHANNEL_GREEN},
-                    {"b", VSH_MASK_CHANNEL_BLUE},
-                    {"m", VSH_MASK_CHANNEL_ALPHA},
-                    {"l", VSH_MASK_CHANNEL_LUMINANCE}};
+    } channels[] = {{"r", VSHI_MASK_CHANNEL_RED},
+                    {"g", VSHI_MASK_CHANNEL_GREEN},
+                    {"b", VSHI_MASK_CHANNEL_BLUE},
+                    {"m", VSHI_MASK_CHANNEL_ALPHA},
+                    {"l", VSHI_MASK_CHANNEL_LUMINANCE}};
     for (size_t i = 0; i < sizeof channels / sizeof channels[0]; ++i) {
         if (vshi_token_is(value, channels[i].word)) {
             *channel = channels[i].channel;
@@ -94,7 +94,7 @@ static bool is_option(vshi_token word) {
 }
 
 bool vshi_mtl_map_read(const char *at, const char *end, vshi_mtl_map *map) {
-    *map = (vshi_mtl_map){.channel = VSH_MASK_CHANNEL_AUTO, .scale = {1.0, 1.0}};
+    *map = (vshi_mtl_map){.channel = VSHI_MASK_CHANNEL_AUTO, .scale = {1.0, 1.0}};
     for (;;) {
         const char *next = at;
         const vshi_token word = vshi_scan_token(&next, end);

@@ -211,7 +211,7 @@ class Mesh(Struct, kind="vsh_mesh"):
 
     @solidity.setter
     def solidity(self, value: str) -> None:
-        self.struct.solidity = constant("VSH_SOLIDITY_", value, "solidity")
+        self.struct.solidity = constant("vsh_solidity", value, "solidity")
 
     @property
     def one_sided(self) -> bool:
@@ -281,7 +281,7 @@ class Model(Handle, kind="vsh_model"):
             of a value of 1, and under the lowest sample (0: a twentieth of the longer side), local units
         """
         source = heights_source(values, size, height, base, transform, name)
-        return cls._of(call(lib.vsh_model_from_heights, source, constant("VSH_HEIGHTS_", what, "what"), OUT, run=run))
+        return cls._of(call(lib.vsh_model_from_heights, source, constant("vsh_heights_part", what, "what"), OUT, run=run))
 
     def __len__(self) -> int:
         return lib.vsh_model_mesh_count(self.handle)

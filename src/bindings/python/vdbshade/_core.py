@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, 
 import numpy
 
 from . import _abi, types
-from ._tables import MEMBERS, VERSION, WORDS
+from ._version import VERSION
 
 # --- the library and its errors
 
@@ -111,7 +111,7 @@ class VdbshadeWarning(UserWarning):
     """A problem was worked around (docs/warnings.md)."""
 
 
-_ERRORS = {WORDS["VSH_ERROR_"][word]: kind for word, kind in {
+_ERRORS = {getattr(lib, "VSH_ERROR_" + word.upper()): kind for word, kind in {
     "argument": ArgumentError, "input": InputError, "read": ReadError, "write": WriteError, "limit": LimitError,
     "memory": OutOfMemoryError, "cancelled": Cancelled, "unsupported": UnsupportedError, "internal": InternalError}.items()}
 
@@ -229,29 +229,41 @@ def vector(given: Any, length: int, name: str) -> Any:
 # --- structs from keywords and back: members by their names, constants by words, lengths checked
 
 
-def constant(prefix: str, given: Any, name: str) -> int:
-    """The number of a word: ``constant("VSH_SHADOW_", "cone", "method")``."""
+_words: Dict[str, Dict[str, int]] = {}
+
+
+def words(enum: str) -> Dict[str, int]:
+    """The words of an enum's constants, without what all begin with: ``words("vsh_up")["minus_x"]``. Negative ones last."""
+    if enum not in _words:
+        constants = ffi.typeof(enum).relements
+        begin = os.path.commonprefix(list(constants)).rfind("_") + 1
+        _words[enum] = {name[begin:].lower(): constants[name] for name in sorted(constants, key=lambda name: constants[name] & 0xFFFFFFFF)}
+    return _words[enum]
+
+
+def constant(enum: str, given: Any, name: str) -> int:
+    """The number of a word: ``constant("vsh_shadow_method", "cone", "method")``."""
+    table = words(enum)
     if isinstance(given, str):
         word = given.lower().replace("-", "_")
-        if prefix == "VSH_UP_" and word.startswith("_"):
+        if enum == "vsh_up" and word.startswith("_"):
             word = "minus" + word
-        table = WORDS[prefix]
         if word not in table:
             raise ValueError(f"{name} {given!r}: expected one of {', '.join(table)}")
         return table[word]
     if isinstance(given, (int, numpy.integer)) and not isinstance(given, bool):
         return int(given)
-    raise TypeError(f"{name}: expected one of {', '.join(WORDS[prefix])}, got {type(given).__name__}")
+    raise TypeError(f"{name}: expected one of {', '.join(table)}, got {type(given).__name__}")
 
 
-def word(prefix: str, number: int) -> Any:
+def word(enum: str, number: int) -> Any:
     """The word of a number, or the number if it has no word."""
-    return next((w for w, n in WORDS[prefix].items() if n == number), number)
+    return next((w for w, n in words(enum).items() if n == number), number)
 
 
-def words_of_bits(prefix: str, bits: int) -> List[str]:
-    """The words of the constants whose bits are set."""
-    return [name for name, bit in WORDS[prefix].items() if bits & bit]
+def words_of_bits(enum: str, bits: int) -> List[str]:
+    """The words of the single bits that are set."""
+    return [name for name, bit in words(enum).items() if bits & bit and bit & (bit - 1) == 0]
 
 
 def path_of(given: Any, name: str) -> bytes:
@@ -311,8 +323,8 @@ def is_text(ctype: Any) -> bool:
 
 
 def kind_of(ctype: Any) -> str:
-    """The name of a struct: "vsh_grid"."""
-    return ctype.cname[len("struct ") :]
+    """The name of a struct or an enum: "vsh_grid"."""
+    return ctype.cname.split(" ")[1]
 
 
 class Struct:
@@ -403,18 +415,18 @@ class Filled(Struct):
             raise TypeError(f"{kind[4:]}: no option {name!r}; there are {', '.join(f for f in fields if f not in ('struct_size', 'user'))}")
         field = fields[name]
         try:
-            if field.kind == "primitive":
-                setattr(struct, name, _number(field, MEMBERS.get(f"{kind}.{name}"), value, name))
+            if field.kind in ("primitive", "enum"):
+                setattr(struct, name, _number(field, value, name))
             elif field.kind == "struct":
                 self._set_struct(getattr(struct, name), kind_of(field), value, name)
             elif field.kind == "array":
-                setattr(struct, name, _items(field, MEMBERS.get(f"{kind}.{name}"), value, name))
+                setattr(struct, name, _items(field, value, name))
             elif field.kind == "pointer":
                 setattr(struct, name, self._pointer(struct, kind, field, value, name))
             else:
                 setattr(struct, name, value)  # a callback
         except OverflowError:
-            raise ValueError(f"{name} {value!r}: too large for {field.cname}") from None
+            raise ValueError(f"{name} {value!r}: too {'small' if value < 0 else 'large'} for {field.cname}") from None
         except TypeError as error:
             if str(error).startswith(name):
                 raise
@@ -447,15 +459,17 @@ class Filled(Struct):
         return self._kept(texts_of(values, name) if field.item.kind == "pointer" else structs_of(kind_of(field.item), values, name))
 
 
-def _number(field: Any, prefix: Optional[str], value: Any, name: str) -> Any:
-    if prefix is not None:
-        return constant(prefix, value, name)
+def _number(field: Any, value: Any, name: str) -> Any:
+    if field.kind == "enum":
+        return constant(kind_of(field), value, name)
+    if name == "padding" and value == "auto":
+        return lib.VSH_PADDING_AUTO
     if isinstance(value, str):
         raise TypeError(f"{name}: expected a number, got {value!r}")
     return float(value) if field.cname in ("double", "float") else _whole(value, name)
 
 
-def _items(field: Any, prefix: Optional[str], value: Any, name: str) -> Any:
+def _items(field: Any, value: Any, name: str) -> Any:
     """Converts a text or numbers for an array in a struct."""
     if field.item.cname == "char":
         encoded = value.encode()
@@ -465,8 +479,8 @@ def _items(field: Any, prefix: Optional[str], value: Any, name: str) -> Any:
     numbers = list(value)
     if len(numbers) != field.length:
         raise ValueError(f"{name}: expected {field.length} numbers, got {len(numbers)}")
-    if prefix is not None:
-        return [constant(prefix, n, name) for n in numbers]
+    if field.item.kind == "enum":
+        return [constant(kind_of(field.item), n, name) for n in numbers]
     return [float(n) if field.item.cname in ("double", "float") else int(n) for n in numbers]
 
 
@@ -508,13 +522,15 @@ def record_of(struct: Any) -> Any:
 
 def member(struct: Any, kind: str, name: str) -> Any:
     """A member of a struct as a word, a number, a text, a tuple, a record, or a pointer."""
-    field, prefix, value = _fields(kind)[name], MEMBERS.get(f"{kind}.{name}"), getattr(struct, name)
+    field, value = _fields(kind)[name], getattr(struct, name)
     if field.kind == "primitive":
-        return word(prefix, value) if prefix else value
+        return value
+    if field.kind == "enum":
+        return word(kind_of(field), value)
     if field.kind == "array":
         if field.item.cname == "char":
             return text(value)
-        return tuple(word(prefix, v) for v in value) if prefix else tuple(value)
+        return tuple(word(kind_of(field.item), v) for v in value) if field.item.kind == "enum" else tuple(value)
     if field.kind == "struct":
         return record_of(value)
     if is_text(field):

@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 from . import types
 from ._core import (array, ask, borrowed, call, constant, ffi, Filled, Handle, index_of, keep, lib, note, OUT, output, pairs_of,
                     Path, path_of, pointer, record_of, Run, Struct, structs_of, text, texts_of, transform as matrix,
-                    Unpack, vector, words_of_bits)
+                    Unpack, vector, words, words_of_bits)
 from ._casters import (Attributes, attributes_of, Grid, Light, lights_of, Mesh, Meshes, meshes_of, Model, names_of, Occluders, rules_of, Sdf)
 from ._shading import Charts, Planes
-from ._tables import WORDS
 
 # --- lightmap UVs, assets with their light, and pages that show them
 
@@ -533,7 +532,7 @@ def file_digest(path: Path, *, run: Optional[Run] = None) -> str:
 
 def reader_confinement(*, run: Optional[Run] = None) -> List[str]:
     """How the reader that parses files is confined here: of "limits", "calls", "files"."""
-    return words_of_bits("VSH_CONFINED_", call(lib.vsh_reader_confinement, OUT, run=run))
+    return words_of_bits("vsh_confinement", call(lib.vsh_reader_confinement, OUT, run=run))
 
 
 def provenance(scene: Optional[Scene] = None, *, files: Sequence[Path] = (), command: Optional[str] = None,
@@ -603,7 +602,7 @@ class FlatScene(SceneFile, kind="vsh_flat_scene"):
 # --- comparing baked values with golden ones
 
 
-MEASURES = tuple(WORDS["VSH_MEASURE_"])
+MEASURES = tuple(words("vsh_measure"))
 
 
 class Measures(types.Measures):
@@ -706,5 +705,5 @@ def compare_files(golden: Path, fresh: Path, *, limits: Optional[Mapping[str, fl
     """
     filled = Filled("vsh_compare_files_options", options)
     for name, value in (limits or {}).items():
-        filled.struct.limits[constant("VSH_MEASURE_", name, "limits")] = value
+        filled.struct.limits[constant("vsh_measure", name, "limits")] = value
     return Comparison(call(lib.vsh_compare_files, path_of(golden, "golden"), path_of(fresh, "fresh"), filled, OUT, run=run))

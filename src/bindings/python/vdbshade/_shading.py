@@ -202,11 +202,11 @@ class Query(Handle, kind="vsh_query"):
             self._check(out, shapes)
         values, keeps = self._output(out, count)
         if count <= _SMALL:
-            error = ffi.new("vsh_error *")
+            failure = ffi.new("vsh_error *")
             result = lib.vsh_query_points(self.handle, points, layout, run_of(run).struct, values, ffi.NULL if stats is None else stats.struct,
-                                          error)
+                                          failure)
             if result != 0:
-                fail(result, error)
+                fail(result, failure)
         else:
             call(lib.vsh_query_points, self, points, layout, values, stats, run=run)
         del keeps, up_array, number_array
@@ -274,9 +274,9 @@ def _flat(channels: Mapping[str, ArrayLike]) -> "Tuple[Dict[str, numpy.ndarray],
 
 def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> Filled:
     """``vsh_image`` of channels' names, without planes."""
-    kinds = [constant("VSH_CHANNEL_", (holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")), "holds") for n in names]
+    kinds = [constant("vsh_channel_kind", (holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")), "holds") for n in names]
     return Filled("vsh_image", width=shape[1], height=shape[0], channel_count=len(names), names=texts_of(list(names), "names"),
-                  holds=ffi.new("int32_t[]", kinds or 1))
+                  holds=ffi.new("vsh_channel_kind[]", kinds or 1))
 
 
 def image_of(channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, str]] = None) -> Filled:
@@ -441,7 +441,7 @@ class _Planes(Struct):
             raise ValueError(f"out: {', '.join(sorted(unknown))}: not asked for; there are {', '.join(wanted)}")
         self.arrays = {n: output((out or {}).get(n), numpy.float32, size, f"out[{n!r}]") for n, size in wanted.items()}
         given: Dict[str, Any] = dict(asked=dict(invalid=bool(invalid), sky=sky))
-        given["bent_space"] = None if bent is None else constant("VSH_BENT_", bent, "bent")
+        given["bent_space"] = None if bent is None else constant("vsh_bent_space", bent, "bent")
         given["tint_by"] = None if tint is None else tint_of(tint)
         given["ambient"] = None if ambient is None else vector(ambient, 3, "ambient")
         for member, kind in (("shadow", "shadow"), ("tint", "tint"), ("shadow_error", "error")):
