@@ -130,9 +130,9 @@ typedef enum vsh_method_trait {
     VSH_METHOD_INNER = 8 /* shadows: knows the inner penumbra, where less than half of the light is visible */
 } vsh_method_trait;
 
-/* Return the traits of a method, 0 for an unknown one. For auto, those that adaptive and exact share. */
-VSH_API uint32_t vsh_shadow_method_traits(int32_t method);
-VSH_API uint32_t vsh_ao_method_traits(int32_t method);
+/* Returns the traits of a shadow method (VSH_NAMES_SHADOW) or AO method (VSH_NAMES_AO), as a sum of
+ * VSH_METHOD_…; 0 for others. For auto, those that adaptive and exact share. */
+VSH_API uint32_t vsh_method_traits(vsh_names kind, int32_t method);
 
 /* How rays are distributed over the light's disc or the hemisphere. vsh_shade_options.frame picks an
  * independent set: bakes of frames 0 … n - 1 may be averaged. */

@@ -31,9 +31,6 @@ static inline vsh_camera vsh_camera_default(void) {
     return camera;
 }
 
-/* Checks a camera. Errors: VSH_ERROR_ARGUMENT, naming the member, its value and the limit. */
-VSH_API vsh_result vsh_camera_check(const vsh_camera *camera, vsh_error *error);
-
 /* Moves a camera so that it sees a whole world box, whose centre becomes the target; `up` and `fov` stay.
  * `azimuth`: radians around `up` (0: +z, or -y for an `up` along z), anticlockwise from above. `elevation`:
  * radians above the horizon, within ±1.57. `aspect`: width over height, > 0. Errors: VSH_ERROR_ARGUMENT (a
@@ -48,8 +45,9 @@ VSH_API vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[
 VSH_API vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const double *points,
                                            double azimuth, double elevation, double aspect, vsh_error *error);
 
-/* Turns a checked camera by `angle` radians around `up` through its target, anticlockwise from above. */
-VSH_API void vsh_camera_orbit(vsh_camera *camera, double angle);
+/* Turns a camera by `angle` radians around `up` through its target, anticlockwise from above. An angle of 0
+ * only checks it. Errors: VSH_ERROR_ARGUMENT, naming the member, its value and the limit. */
+VSH_API vsh_result vsh_camera_orbit(vsh_camera *camera, double angle, vsh_error *error);
 
 /* --- pictures */
 
@@ -133,7 +131,7 @@ typedef struct vsh_picture {
  * Pictures do not depend on threads or instruction sets. Stage: "render". `stats` includes camera rays.
  * Errors (the planes are then undefined):
  * - VSH_ERROR_ARGUMENT: picture or occluders NULL; surfaces or lights NULL with a count above 0; more than
- *   VSH_MAX_SURFACES; options out of range; run; as vsh_camera_check() and vsh_query_create();
+ *   VSH_MAX_SURFACES; options out of range; run; as vsh_camera_orbit() and vsh_query_create();
  * - VSH_ERROR_INPUT: lit meshes as vsh_mesh_check(), or without UVs; a lightmap without the channels above;
  * - VSH_ERROR_LIMIT: fields, lit meshes and rendering exceed run->memory_limit;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */

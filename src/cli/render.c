@@ -119,7 +119,7 @@ static int set_options(render_settings *s) {
                   "--size %dx%d: expected at most %d pixels a side", o->width, o->height,
                   VSH_MAX_PICTURE_SIZE);
     if (cli_was_given("look-at")) {
-        CLI_TRY(cli_check(vsh_camera_check(&o->camera, &cli_error)));
+        CLI_TRY(cli_check(vsh_camera_orbit(&o->camera, 0.0, &cli_error)));
     }
     vsh_image_options as;
     const vsh_image image = describe_image(s, &as);
@@ -493,11 +493,8 @@ static int place_camera(render_settings *s, const render_shown *seen) {
     if (cli_was_given("look-at")) {
         memcpy(camera->target, given.target, sizeof camera->target);
     }
-    CLI_TRY(cli_check(vsh_camera_check(camera, &cli_error)));
-    if (!near) {
-        vsh_camera_orbit(camera, s->orbit_deg * CLI_DEGREE);
-    }
-    return CLI_OK;
+    const double turn = near ? 0.0 : s->orbit_deg * CLI_DEGREE;
+    return cli_check(vsh_camera_orbit(camera, turn, &cli_error));
 }
 
 /* --- the command */

@@ -51,9 +51,10 @@ void cli_stats_methods(cli_stats *stats, const vsh_scene *scene, int32_t has_tri
     stats->max_error = shade->max_error;
     if (scene->light_count > 0) {
         stats->methods[CLI_STATS_SHADOW] =
-            method_of(vsh_get_name(VSH_NAMES_SHADOW, method), vsh_shadow_method_traits(method));
+            method_of(vsh_get_name(VSH_NAMES_SHADOW, method), vsh_method_traits(VSH_NAMES_SHADOW, method));
     }
-    const cli_method open = method_of(vsh_get_name(VSH_NAMES_AO, ao_method), vsh_ao_method_traits(ao_method));
+    const cli_method open =
+        method_of(vsh_get_name(VSH_NAMES_AO, ao_method), vsh_method_traits(VSH_NAMES_AO, ao_method));
     if (scene->ao) {
         stats->methods[CLI_STATS_AO] = open;
     }

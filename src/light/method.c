@@ -31,18 +31,17 @@ enum {
     AO_COUNT = sizeof ao_traits / sizeof ao_traits[0],
 };
 
-uint32_t vsh_shadow_method_traits(int32_t method) {
-    return method >= 0 && method < SHADOW_COUNT ? shadow_traits[method] : 0;
+uint32_t vsh_method_traits(vsh_names kind, int32_t method) {
+    const uint32_t place = (uint32_t)method;
+    return kind == VSH_NAMES_SHADOW && place < SHADOW_COUNT ? shadow_traits[place]
+           : kind == VSH_NAMES_AO && place < AO_COUNT       ? ao_traits[place]
+                                                            : 0;
 }
 
 int32_t vshi_shadow_method_resolve(int32_t method, int32_t has_triangles) {
     return method != VSH_SHADOW_AUTO ? method
            : has_triangles != 0      ? (int32_t)VSH_SHADOW_EXACT
                                      : (int32_t)VSH_SHADOW_ADAPTIVE;
-}
-
-uint32_t vsh_ao_method_traits(int32_t method) {
-    return method >= 0 && method < AO_COUNT ? ao_traits[method] : 0;
 }
 
 int32_t vshi_ao_method_resolve(int32_t method, int32_t has_triangles) {

@@ -203,8 +203,8 @@ static vsh_result open_ao(vshi_tracer *t, const vsh_lightmap *planes, bool sky, 
 }
 
 static bool keeps_error(const vsh_shade_options *shade, bool of_light) {
-    const uint32_t traits =
-        of_light ? vsh_shadow_method_traits(shade->method) : vsh_ao_method_traits(shade->ao_method);
+    const uint32_t traits = of_light ? vsh_method_traits(VSH_NAMES_SHADOW, shade->method)
+                                     : vsh_method_traits(VSH_NAMES_AO, shade->ao_method);
     return (traits & VSH_METHOD_KEEPS_ERROR) != 0;
 }
 

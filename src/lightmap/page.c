@@ -41,7 +41,7 @@ void vshi_bent_normalize(float *bent) {
 
 bool vshi_ao_is_shared(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
     return spacing > 1 && !layered_ao &&
-           (vsh_ao_method_traits(shade->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
+           (vsh_method_traits(VSH_NAMES_AO, shade->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
 }
 
 /* Allocates arrays in a store. */

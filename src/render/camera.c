@@ -3,6 +3,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/vec.h"
+#include "render/render.h"
 
 #include <vdbshade/picture.h>
 
@@ -40,8 +41,7 @@ static vsh_result resolve(const vsh_camera *camera, vsh_camera *full, vsh_error 
                           : vshi_options_resolve(camera, full, sizeof *full, "vsh_camera", error);
 }
 
-vsh_result vsh_camera_check(const vsh_camera *camera, vsh_error *error) {
-    VSHI_FLOATS;
+vsh_result vshi_camera_check(const vsh_camera *camera, vsh_error *error) {
     vsh_camera full;
     VSHI_TRY(resolve(camera, &full, error));
     VSHI_TRY(check_vector("position", full.position, error));
@@ -173,12 +173,20 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
 }
 
 /* Rodrigues' rotation. */
-void vsh_camera_orbit(vsh_camera *camera, double angle) {
+vsh_result vsh_camera_orbit(vsh_camera *camera, double angle, vsh_error *error) {
     VSHI_FLOATS;
+    VSHI_TRY(vshi_camera_check(camera, error));
+    if (!isfinite(angle)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "camera: angle %g: expected a number", angle);
+    }
+    if (angle == 0.0) {
+        return VSH_OK;
+    }
     const vshi_vec axis = vshi_unit(vshi_vec_of(camera->up)), target = vshi_vec_of(camera->target);
     const vshi_vec arm = vshi_sub(vshi_vec_of(camera->position), target);
     const double c = vshi_cos(angle), s = vshi_sin(angle);
     const vshi_vec turned = vshi_add(vshi_add(vshi_scale(arm, c), vshi_scale(vshi_cross(axis, arm), s)),
                                      vshi_scale(axis, vshi_dot(axis, arm) * (1.0 - c)));
     set(camera->position, vshi_add(target, turned));
+    return VSH_OK;
 }

@@ -723,7 +723,7 @@ static vsh_result check_options(const vsh_render_options *o, size_t light_count,
         VSHI_TRY(check_colors("color of lit meshes", o->lit[i].color, 1.0, error));
     }
     VSHI_TRY(vshi_tint_check(&o->tint, error));
-    return vsh_camera_check(&o->camera, error);
+    return vshi_camera_check(&o->camera, error);
 }
 
 static vsh_result check_surfaces(const vsh_surface *surfaces, size_t count, vsh_error *error) {

@@ -46,6 +46,9 @@ static inline vshi_vec vshi_sample_ray(const vshi_sample_grid *grid, int32_t col
 
 typedef struct vshi_lit vshi_lit;
 
+/* Checks a camera; the error names the member, its value and the limit. */
+vsh_result vshi_camera_check(const vsh_camera *camera, vsh_error *error);
+
 /* Checks the options' lit meshes, except for their lightmaps' channels. Errors: VSH_ERROR_ARGUMENT,
  * VSH_ERROR_INPUT, naming the mesh. */
 vsh_result vshi_lit_check(const vsh_render_options *options, vsh_error *error);

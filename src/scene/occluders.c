@@ -98,8 +98,8 @@ static bool is_traceable(const vsh_scene *scene, const vsh_scene_layer *layer) {
 static bool any_method_is(const vsh_scene *scene, const vsh_scene_layer *layer, uint32_t traits, bool has) {
     const int32_t can = is_traceable(scene, layer);
     const uint32_t shadow =
-        vsh_shadow_method_traits(vshi_shadow_method_resolve(find_method(scene, layer), can));
-    const uint32_t ao = vsh_ao_method_traits(vshi_ao_method_resolve(scene->shade.ao_method, can));
+        vsh_method_traits(VSH_NAMES_SHADOW, vshi_shadow_method_resolve(find_method(scene, layer), can));
+    const uint32_t ao = vsh_method_traits(VSH_NAMES_AO, vshi_ao_method_resolve(scene->shade.ao_method, can));
     return (scene->light_count > 0 && ((shadow & traits) == traits) == has) ||
            (casts_ao(scene, layer) && ((ao & traits) == traits) == has);
 }

@@ -188,8 +188,9 @@ vsh_result vshi_list_lightmaps(vshi_scene_bake *bake, vsh_error *error) {
 /* Whether the scene asks for a kind of plane: by its lights, AO and what belongs to them, or by a wish. */
 static bool is_asked(const vshi_plane_kind *kind, const vsh_scene *scene) {
     /* remaining errors: only of methods that know them */
-    const bool shadow_error = (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
-    const bool ao_error = (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
+    const bool shadow_error =
+        (vsh_method_traits(VSH_NAMES_SHADOW, scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    const bool ao_error = (vsh_method_traits(VSH_NAMES_AO, scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
     const struct {
         size_t plane;
         bool asked;

@@ -165,7 +165,7 @@ static vsh_result add_method(vsh_provenance *p, const vsh_provenance_source *sou
     const vsh_shade_options *o = &source->scene->shade;
     const int32_t method = ao ? vshi_ao_method_resolve(o->ao_method, source->has_triangles)
                               : vshi_shadow_method_resolve(o->method, source->has_triangles);
-    const uint32_t traits = ao ? vsh_ao_method_traits(method) : vsh_shadow_method_traits(method);
+    const uint32_t traits = vsh_method_traits(ao ? VSH_NAMES_AO : VSH_NAMES_SHADOW, method);
     if ((traits & VSH_METHOD_RAYS) != 0) {
         describe_rays(o, (traits & VSH_METHOD_KEEPS_ERROR) != 0, more, sizeof more);
     } else if (ao && method == VSH_AO_CONES) {

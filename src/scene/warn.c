@@ -146,8 +146,9 @@ void vshi_warn_baked(const vsh_scene *scene, const vshi_target *target, const vs
                      const vsh_run *run) {
     const char *path = target->receiver.path;
     const vsh_shade_stats *shade = &baked->shade;
-    const bool shadow_rays = (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
-    const bool ao_rays = (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
+    const bool shadow_rays =
+        (vsh_method_traits(VSH_NAMES_SHADOW, scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    const bool ao_rays = (vsh_method_traits(VSH_NAMES_AO, scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
     const bool cones_decide = (scene->light_count > 0 && !shadow_rays) || (scene->ao && !ao_rays);
     if (baked->invalid_texels > 0) {
         note_invalid(target, baked, vshi_scene_marches(scene, NULL) == 0, run);

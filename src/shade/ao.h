@@ -126,13 +126,13 @@ vshi_shade_fn vshi_ao_by_rays;
 enum { VSHI_AO_GRAIN = 64 }; /* points of a piece, with cones and rays */
 
 static inline bool vshi_ao_has_rays(const vsh_shade_options *options) {
-    return (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_RAYS) != 0;
+    return (vsh_method_traits(VSH_NAMES_AO, options->ao_method) & VSH_METHOD_RAYS) != 0;
 }
 
 /* Whether AO is traced against triangles (NULL: there are none). The options may be unsettled. */
 static inline bool vshi_ao_traces(const vsh_shade_options *options, const vshi_triangles *triangles) {
     const int32_t method = vshi_ao_method_resolve(options->ao_method, triangles != NULL);
-    return (vsh_ao_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
+    return (vsh_method_traits(VSH_NAMES_AO, method) & VSH_METHOD_TRIANGLES) != 0;
 }
 
 /* --- the frame of a point */

@@ -376,7 +376,8 @@ static double spread_of(int32_t sampler, int32_t rays) {
 }
 
 int32_t vshi_ao_most_rays(const vsh_shade_options *options) {
-    const bool keeps_error = (vsh_ao_method_traits(options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    const bool keeps_error =
+        (vsh_method_traits(VSH_NAMES_AO, options->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
     return vshi_shade_most_rays(options, spread_of, keeps_error);
 }
 

@@ -176,7 +176,7 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
                          "method %s: the occluders have no voxels, which it marches; exact needs none",
                          vsh_get_name(VSH_NAMES_SHADOW, full.method));
     }
-    const bool inner = (vsh_shadow_method_traits(full.method) & VSH_METHOD_INNER) != 0;
+    const bool inner = (vsh_method_traits(VSH_NAMES_SHADOW, full.method) & VSH_METHOD_INNER) != 0;
     *task = (vshi_shadow_task){
         .field = field, .triangles = triangles, .light = light, .options = full, .lowest = inner ? 1.0 : 0.0};
     task->leaky = traced && (field->shell_thickness > 0.0 || vshi_triangles_have_holes(triangles));
@@ -256,6 +256,7 @@ static double spread_of(int32_t sampler, int32_t rays) {
 }
 
 int32_t vshi_shadow_most_rays(const vsh_shade_options *options) {
-    const bool keeps_error = (vsh_shadow_method_traits(options->method) & VSH_METHOD_KEEPS_ERROR) != 0;
+    const bool keeps_error =
+        (vsh_method_traits(VSH_NAMES_SHADOW, options->method) & VSH_METHOD_KEEPS_ERROR) != 0;
     return vshi_shade_most_rays(options, spread_of, keeps_error);
 }

@@ -36,13 +36,13 @@ vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *
                                const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error);
 
 static inline bool vshi_shadow_has_rays(const vsh_shade_options *options) {
-    return (vsh_shadow_method_traits(options->method) & VSH_METHOD_RAYS) != 0;
+    return (vsh_method_traits(VSH_NAMES_SHADOW, options->method) & VSH_METHOD_RAYS) != 0;
 }
 
 /* Whether shadows are traced against triangles (NULL: there are none). The options may be unsettled. */
 static inline bool vshi_shadow_traces(const vsh_shade_options *options, const vshi_triangles *triangles) {
     const int32_t method = vshi_shadow_method_resolve(options->method, triangles != NULL);
-    return (vsh_shadow_method_traits(method) & VSH_METHOD_TRIANGLES) != 0;
+    return (vsh_method_traits(VSH_NAMES_SHADOW, method) & VSH_METHOD_TRIANGLES) != 0;
 }
 
 /* The largest number of rays of a point, by settled options. */

@@ -187,7 +187,7 @@ static void render(fuzz_input *input) {
             vsh_camera_frame(&camera, bounds, bounds + 3, angles[0], angles[1], angles[2], fuzz_error());
         fuzz_check_plain(framed);
         if (framed == VSH_OK) {
-            vsh_camera_orbit(&camera, angles[0]);
+            fuzz_check_plain(vsh_camera_orbit(&camera, angles[0], fuzz_error()));
             options.camera = camera;
         }
     }

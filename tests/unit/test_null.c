@@ -225,7 +225,7 @@ TEST(drawing_and_comparing_without_their_arguments_are_refused) {
     REFUSED(vsh_render(NULL, 0, NULL, &light, 1, &options, NULL, &picture, NULL, &error));
     REFUSED(vsh_render(NULL, 0, casters, NULL, 1, &options, NULL, &picture, NULL, &error));
     REFUSED(vsh_render(NULL, 0, casters, &light, 1, &options, NULL, NULL, NULL, &error));
-    REFUSED(vsh_camera_check(NULL, &error));
+    REFUSED(vsh_camera_orbit(NULL, 0.0, &error));
     REFUSED(vsh_camera_frame(NULL, bounds, bounds, 0.0, 0.0, 1.0, &error));
     REFUSED(vsh_camera_frame(&options.camera, NULL, bounds, 0.0, 0.0, 1.0, &error));
     REFUSED(vsh_camera_frame(&options.camera, bounds, NULL, 0.0, 0.0, 1.0, &error));

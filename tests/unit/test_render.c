@@ -293,7 +293,7 @@ TEST(options_out_of_range_and_limits_are_refused) {
 /* --- cameras */
 
 TEST(cameras_that_see_nothing_are_refused) {
-    const struct {
+    struct {
         vsh_camera camera;
         const char *part;
     } cases[] = {{camera_at(1.0, 2.0, 3.0, 1.0, 2.0, 3.0, 30.0), "position and target"},
@@ -302,10 +302,11 @@ TEST(cameras_that_see_nothing_are_refused) {
                  {camera_at(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0), ""},
                  {{.struct_size = 4}, ""}};
     for (size_t i = 0; i < COUNT_OF(cases); ++i) {
-        assert_fails(vsh_camera_check(&cases[i].camera, &failure), VSH_ERROR_ARGUMENT, cases[i].part);
+        assert_fails(vsh_camera_orbit(&cases[i].camera, 0.0, &failure), VSH_ERROR_ARGUMENT, cases[i].part);
     }
-    const vsh_camera good = vsh_camera_default();
-    assert_ok(vsh_camera_check(&good, &failure));
+    vsh_camera good = vsh_camera_default();
+    assert_ok(vsh_camera_orbit(&good, 0.0, &failure));
+    assert_fails(vsh_camera_orbit(&good, NAN, &failure), VSH_ERROR_ARGUMENT, "angle nan");
     const double points[2][6] = {{1.0, 2.0, 3.0, 1.0, 2.0, 3.0}, {0.0, 0.0, 0.0, NAN, 1.0, 1.0}};
     const struct {
         size_t count;
@@ -327,7 +328,7 @@ TEST(a_framed_box_fills_the_picture) {
             vsh_camera camera = vsh_camera_default();
             memcpy(camera.up, ups[u], sizeof camera.up);
             assert_ok(vsh_camera_frame(&camera, low, high, azimuth, 0.4, (double)WIDE / HIGH, &failure));
-            assert_ok(vsh_camera_check(&camera, &failure));
+            assert_ok(vsh_camera_orbit(&camera, 0.0, &failure));
             const pinhole p = pinhole_of(&camera);
             double most = 0.0;
             for (int corner = 0; corner < 8; ++corner) {
@@ -358,7 +359,7 @@ TEST(framed_points_fill_the_picture) {
         vsh_camera camera = vsh_camera_default();
         assert_ok(vsh_camera_frame_points(&camera, COUNT, &points[0][0], azimuth, 0.4, (double)WIDE / HIGH,
                                           &failure));
-        assert_ok(vsh_camera_check(&camera, &failure));
+        assert_ok(vsh_camera_orbit(&camera, 0.0, &failure));
         const pinhole p = pinhole_of(&camera);
         double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
         for (int i = 0; i < COUNT; ++i) {
@@ -381,13 +382,13 @@ TEST(framed_points_fill_the_picture) {
 
 TEST(an_orbit_turns_around_the_target) {
     vsh_camera camera = camera_at(1.0, 2.0, 7.0, 1.0, 1.0, 3.0, 30.0);
-    vsh_camera_orbit(&camera, 0.5 * PI);
+    assert_ok(vsh_camera_orbit(&camera, 0.5 * PI, &failure));
     const double expected[3] = {5.0, 2.0, 3.0};
     for (int i = 0; i < 3; ++i) {
         assert_true(fabs(camera.position[i] - expected[i]) < 1e-12);
     }
     for (int i = 0; i < 5; ++i) {
-        vsh_camera_orbit(&camera, 0.3 * PI);
+        assert_ok(vsh_camera_orbit(&camera, 0.3 * PI, &failure));
     }
     assert_true(fabs(camera.position[2] - 7.0) < 1e-12 && fabs(camera.position[0] - 1.0) < 1e-12);
 }

@@ -299,8 +299,9 @@ static bool bakes_ao(const vsh_scene *scene) {
 
 /* Whether a method that bakes the scene has all of these traits. */
 static bool any_has(const vsh_scene *scene, uint32_t traits) {
-    return (scene->light_count > 0 && (vsh_shadow_method_traits(scene->shade.method) & traits) == traits) ||
-           (bakes_ao(scene) && (vsh_ao_method_traits(scene->shade.ao_method) & traits) == traits);
+    return (scene->light_count > 0 &&
+            (vsh_method_traits(VSH_NAMES_SHADOW, scene->shade.method) & traits) == traits) ||
+           (bakes_ao(scene) && (vsh_method_traits(VSH_NAMES_AO, scene->shade.ao_method) & traits) == traits);
 }
 
 static const char *method_of(const vsh_scene *scene) {
@@ -311,11 +312,12 @@ static const char *method_of(const vsh_scene *scene) {
 /* Changes methods that keep no error to auto, unless the command line names them. */
 static int keep_error(vsh_scene *scene) {
     vsh_shade_options *shade = &scene->shade;
-    if (!cli_was_given("method") && (vsh_shadow_method_traits(shade->method) & VSH_METHOD_KEEPS_ERROR) == 0) {
+    if (!cli_was_given("method") &&
+        (vsh_method_traits(VSH_NAMES_SHADOW, shade->method) & VSH_METHOD_KEEPS_ERROR) == 0) {
         shade->method = VSH_SHADOW_AUTO;
     }
     if (!cli_was_given("ao-method") &&
-        (vsh_ao_method_traits(shade->ao_method) & VSH_METHOD_KEEPS_ERROR) == 0) {
+        (vsh_method_traits(VSH_NAMES_AO, shade->ao_method) & VSH_METHOD_KEEPS_ERROR) == 0) {
         shade->ao_method = VSH_AO_AUTO;
     }
     return any_has(scene, VSH_METHOD_KEEPS_ERROR)

@@ -264,9 +264,9 @@ static int choose_answers(query_work *work, const char *why) {
                          .distance = s->distance,
                          .gradient = s->gradient};
     a->shadow_error = scene->error && scene->light_count > 0 &&
-                      (vsh_shadow_method_traits(scene->shade.method) & VSH_METHOD_RAYS) != 0;
-    a->ao_error =
-        scene->error && scene->ao && (vsh_ao_method_traits(scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
+                      (vsh_method_traits(VSH_NAMES_SHADOW, scene->shade.method) & VSH_METHOD_RAYS) != 0;
+    a->ao_error = scene->error && scene->ao &&
+                  (vsh_method_traits(VSH_NAMES_AO, scene->shade.ao_method) & VSH_METHOD_RAYS) != 0;
     CLI_REFUSE_IF(count_floats(a) == 0,
                   "%s: nothing to answer: no lights and no ao; give --sun, --ao, --distance or --gradient",
                   s->bake.input);

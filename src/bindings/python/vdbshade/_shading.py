@@ -241,12 +241,12 @@ _OUTPUT_SIZE = ffi.sizeof("vsh_query_output")
 
 def shadow_method_traits(method: str) -> List[str]:
     """The traits of a shadow method: "rays", "keeps_error", "triangles", "inner"."""
-    return words_of_bits("VSH_METHOD_", lib.vsh_shadow_method_traits(constant("VSH_SHADOW_", method, "method")))
+    return words_of_bits("vsh_method_trait", lib.vsh_method_traits(lib.VSH_NAMES_SHADOW, constant("vsh_shadow_method", method, "method")))
 
 
 def ao_method_traits(method: str) -> List[str]:
     """The traits of an AO method, as of shadow_method_traits()."""
-    return words_of_bits("VSH_METHOD_", lib.vsh_ao_method_traits(constant("VSH_AO_", method, "method")))
+    return words_of_bits("vsh_method_trait", lib.vsh_method_traits(lib.VSH_NAMES_AO, constant("vsh_ao_method", method, "method")))
 
 
 # --- image files: planes of floats with names
@@ -662,7 +662,7 @@ class Camera(Struct, kind="vsh_camera"):
 
     def __init__(self, **options: "Unpack[types.Camera]") -> None:
         self.struct = Filled("vsh_camera", options).struct
-        call(lib.vsh_camera_check, self)
+        call(lib.vsh_camera_orbit, self, 0.0)
 
     def frame(self, bounds_min: ArrayLike, bounds_max: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5,
               aspect: float = 16 / 9) -> "Camera":
@@ -678,7 +678,7 @@ class Camera(Struct, kind="vsh_camera"):
 
     def orbit(self, angle: float) -> "Camera":
         """Turns it around its target, radians."""
-        ask(lib.vsh_camera_orbit, self, angle)
+        call(lib.vsh_camera_orbit, self, angle)
         return self
 
 
