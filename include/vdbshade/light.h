@@ -31,7 +31,8 @@ typedef enum vsh_falloff {
     VSH_FALLOFF_QUADRATIC = 2       /* (1 - d / reach)², 0 beyond the reach */
 } vsh_falloff;
 
-/* A light. Shadow values depend on its shape and place alone; falloff, colour, a spot's edge and cosines
+/* A light. `direction` points towards the light; only a spot's `axis` points away from it. Angles are full
+ * angles. Shadow values depend on its shape and place alone; falloff, colour, a spot's edge and cosines
  * enter irradiance. But points beyond the reach of VSH_FALLOFF_QUADRATIC, or outside a spot's outer cone, get
  * no light: their shadow value is 0, and costs no ray. A size (angle, radius) of 0 is a hard light, and so is
  * a half angle whose sine is below 1e-6. Numbers are finite. Members that the type does not name are ignored.
@@ -49,9 +50,9 @@ typedef struct vsh_light {
     double position[3];  /* of the centre, world units */
     double angle;        /* directional: angular diameter, radians, 0 … π (excluded) */
     double radius;       /* sphere, spot: world units, ≥ 0 */
-    double axis[3];      /* spot: the direction in which it shines. Any length but 0 */
-    double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle */
-    double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π */
+    double axis[3];      /* spot: the way it shines, away from the light. Any length but 0 */
+    double inner_angle;  /* spot: angle across full light, radians, 0 … outer_angle */
+    double outer_angle;  /* spot: angle across all light, radians, > 0 … 2 π */
     double reach;        /* for VSH_FALLOFF_QUADRATIC: world units, > 0 */
     double color[3]; /* linear RGB times intensity, ≥ 0: irradiance at normal incidence, before falloff */
     char name[64]; /* "sun": its channel is shadow.sun. Up to 63 of A-Z, a-z, 0-9, _ and -; may be empty if no

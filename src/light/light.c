@@ -63,7 +63,7 @@ static int describe_lamp(const vsh_light *light, char *text, size_t size) {
 /* The light of a lamp, with a smooth edge between the cosines of the outer and inner angles. */
 static double spot_gain(const vsh_light *light, vshi_vec to_light, double distance) {
     const double cosine = -vshi_dot(vshi_unit(vshi_vec_of(light->axis)), to_light);
-    const double outer = vshi_cos(light->outer_angle), inner = vshi_cos(light->inner_angle);
+    const double outer = vshi_cos(0.5 * light->outer_angle), inner = vshi_cos(0.5 * light->inner_angle);
     double edge = cosine >= outer ? 1.0 : 0.0;
     if (inner > outer) {
         const double t = fmin(1.0, fmax(0.0, (cosine - outer) / (inner - outer)));
@@ -76,8 +76,8 @@ static int describe_spot(const vsh_light *light, char *text, size_t size) {
     const double *d = light->axis, *p = light->position;
     return snprintf(text, size,
                     "spot at %.9g %.9g %.9g towards %.9g %.9g %.9g, radius %.9g, %.9g to %.9g degrees", p[0],
-                    p[1], p[2], d[0], d[1], d[2], light->radius, DEGREES * light->inner_angle,
-                    DEGREES * light->outer_angle);
+                    p[1], p[2], d[0], d[1], d[2], light->radius, 0.5 * DEGREES * light->inner_angle,
+                    0.5 * DEGREES * light->outer_angle);
 }
 
 static vsh_result check_spot(const vsh_light *light, vsh_error *error) {
@@ -147,9 +147,9 @@ const vshi_light_member vshi_light_members[] = {
     {MEMBER(radius), .key = "radius", .kind = VSHI_LIGHT_NUMBER, .types = SPHERE | SPOT, .highest = INFINITY,
      .below = true},
     {MEMBER(inner_angle), .key = "inner_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
-     .highest = PI, .apart = true},
+     .highest = 2.0 * PI, .half = true, .apart = true},
     {MEMBER(outer_angle), .key = "outer_deg", .kind = VSHI_LIGHT_ANGLE, .types = SPOT, .required = SPOT,
-     .highest = PI, .above = true},
+     .highest = 2.0 * PI, .half = true, .above = true},
     {MEMBER(edge_u), VECTOR("edge_u", RECTANGLE)},
     {MEMBER(edge_v), VECTOR("edge_v", RECTANGLE)},
     {MEMBER(two_sided), .key = "two_sided", .kind = VSHI_LIGHT_SWITCH, .types = RECTANGLE, .highest = 1.0},
@@ -265,8 +265,8 @@ vshi_light_place vshi_light_in_world(const vsh_light *light) {
     place.rim = -INFINITY;
     if (light->type == VSH_LIGHT_SPOT) {
         place.beam = vshi_unit(vshi_vec_of(light->axis));
-        place.outer = light->outer_angle;
-        place.rim = vshi_cos(light->outer_angle);
+        place.outer = 0.5 * light->outer_angle;
+        place.rim = vshi_cos(0.5 * light->outer_angle);
     }
     return place;
 }

@@ -206,6 +206,7 @@ typedef struct vshi_light_member {
     double lowest, highest; /* an excluded infinity allows any finite value */
     bool above, below;      /* whether `lowest` and `highest` are excluded */
     bool nonzero;           /* of vectors: not all numbers may be 0 */
+    bool half;              /* of angles: files have half of it */
     bool apart;             /* the type's check() checks the range, which depends on another member */
 } vshi_light_member;
 

@@ -45,7 +45,7 @@ enum { MOST_KEYS = 24 };
 
 /* Converts a bound for files: numbers are at most VSHI_LARGEST, and angles are degrees. */
 static double convert_bound(const vshi_light_member *m, double bound) {
-    const double number = m->kind == VSHI_LIGHT_ANGLE ? bound / VSHI_PI * 180.0 : bound;
+    const double number = m->kind == VSHI_LIGHT_ANGLE ? bound / VSHI_PI * (m->half ? 90.0 : 180.0) : bound;
     return fmin(fmax(number, -VSHI_LARGEST), VSHI_LARGEST);
 }
 
@@ -103,7 +103,12 @@ static vsh_result read_keys(vshi_json *reader, const vshi_value *value, bool fla
     }
     vshi_key keys[MOST_KEYS];
     const vshi_table table = {keys, list_keys(flat, keys)};
-    return vshi_read_object(reader, value, &table, type < 0 ? VSHI_ALL : 1U << type, what, light);
+    VSHI_TRY(vshi_read_object(reader, value, &table, type < 0 ? VSHI_ALL : 1U << type, what, light));
+    if (type == VSH_LIGHT_SPOT) {
+        light->inner_angle *= 2.0; /* files have half angles */
+        light->outer_angle *= 2.0;
+    }
+    return VSH_OK;
 }
 
 /* Checks keys together. */
@@ -304,8 +309,8 @@ static vsh_light make_light(const vshi_model_light *given, double angle, double 
     light.angle = angle;
     light.radius = radius;
     if (given->type == VSHI_MODEL_LIGHT_SPOT) {
-        light.inner_angle = given->inner_angle;
-        light.outer_angle = given->outer_angle;
+        light.inner_angle = 2.0 * given->inner_angle;
+        light.outer_angle = 2.0 * given->outer_angle;
         memcpy(light.axis, given->direction, sizeof light.axis); /* away from the spot */
     }
     for (int i = 0; i < 3; ++i) {

@@ -416,7 +416,7 @@ TEST(lights_of_a_scene_have_names_sizes_and_falloff) {
     assert_true(made[1].radius == 0.5 && made[1].falloff == VSH_FALLOFF_INVERSE_SQUARE);
     assert_int_equal(made[2].type, VSH_LIGHT_SPOT);
     assert_vector(made[2].axis, 0, 0, -1);
-    assert_true(made[2].inner_angle == 0.125 && made[2].outer_angle == 0.5);
+    assert_true(made[2].inner_angle == 0.25 && made[2].outer_angle == 1.0);
     vsh_lights_free(made);
     static const double bad[][3] = {{4.0, 0.5, 0.0}, {0.1, -1.0, 0.0}, {0.1, 0.0, -1.0}, {0.1, 0.0, 0.0}};
     for (int i = 0; i < 4; ++i) {

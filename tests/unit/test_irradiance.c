@@ -81,13 +81,13 @@ static float red_leaning(vsh_light light, double degrees) {
 TEST(a_spot_fades_smoothly_between_its_angles) {
     vsh_light light = lamp((const double[]){0.0, 2.0, 0.0}, 0.1);
     light.type = VSH_LIGHT_SPOT;
-    light.inner_angle = RADIANS(20.0);
-    light.outer_angle = RADIANS(40.0);
+    light.inner_angle = RADIANS(40.0);
+    light.outer_angle = RADIANS(80.0);
     float last = 2.0f;
     for (double degrees = 0.0; degrees <= 90.0; degrees += 0.5) {
         const float value = red_leaning(light, degrees);
-        const double t = (cos(RADIANS(degrees)) - cos(light.outer_angle)) /
-                         (cos(light.inner_angle) - cos(light.outer_angle));
+        const double t = (cos(RADIANS(degrees)) - cos(0.5 * light.outer_angle)) /
+                         (cos(0.5 * light.inner_angle) - cos(0.5 * light.outer_angle));
         const double s = fmin(1.0, fmax(0.0, t));
         assert_float_equal(value, s * s * (3.0 - 2.0 * s), 1e-6);
         assert_true(value <= last);
@@ -97,7 +97,7 @@ TEST(a_spot_fades_smoothly_between_its_angles) {
     light.inner_angle = light.outer_angle;
     assert_true(red_leaning(light, 39.0) == 1.0f && red_leaning(light, 41.0) == 0.0f);
     /* as wide as can be, it is a sphere */
-    light.outer_angle = light.inner_angle = PI;
+    light.outer_angle = light.inner_angle = 2.0 * PI;
     assert_true(red_leaning(light, 180.0) == 1.0f);
 }
 
@@ -375,8 +375,8 @@ static vsh_light narrow_spot(void) {
     vsh_light light = lamp((const double[]){0.0, 0.5, 0.0}, 0.05);
     light.type = VSH_LIGHT_SPOT;
     memcpy(light.axis, (const double[]){0.0, -2.0, 0.0}, sizeof light.axis);
-    light.inner_angle = RADIANS(10.0);
-    light.outer_angle = RADIANS(30.0);
+    light.inner_angle = RADIANS(20.0);
+    light.outer_angle = RADIANS(60.0);
     return light;
 }
 

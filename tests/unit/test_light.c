@@ -79,7 +79,7 @@ TEST(the_ends_of_angles_are_in_range) {
     light.angle = nextafter(pi, 0.0);
     accepts(&light);
     light = spot();
-    light.outer_angle = light.inner_angle = pi;
+    light.outer_angle = light.inner_angle = 2.0 * pi;
     accepts(&light);
 }
 
@@ -115,10 +115,10 @@ TEST(bad_values_are_named_with_field_and_limit) {
         {area, &light.reach, 0.0, "reach 0 is out of range 0 (excluded) … inf (excluded)"},
         {spot, &light.axis[1], 0.0, "axis (0, 0, 0): expected a length over 0"},
         {spot, &light.axis[0], NAN, "axis[0] nan is out of range -inf (excluded) … inf (excluded)"},
-        {spot, &light.inner_angle, 0.75, "inner_angle 0.75 is out of range 0 … outer_angle 0.5"},
-        {spot, &light.inner_angle, NAN, "inner_angle nan is out of range 0 … outer_angle 0.5"},
-        {spot, &light.outer_angle, 0.0, "outer_angle 0 is out of range 0 (excluded) … 3.14159265"},
-        {spot, &light.outer_angle, NAN, "outer_angle nan is out of range 0 (excluded) … 3.14159265"},
+        {spot, &light.inner_angle, 1.75, "inner_angle 1.75 is out of range 0 … outer_angle 1"},
+        {spot, &light.inner_angle, NAN, "inner_angle nan is out of range 0 … outer_angle 1"},
+        {spot, &light.outer_angle, 0.0, "outer_angle 0 is out of range 0 (excluded) … 6.28318531"},
+        {spot, &light.outer_angle, NAN, "outer_angle nan is out of range 0 (excluded) … 6.28318531"},
     };
     for (size_t i = 0; i < COUNT_OF(cases); ++i) {
         light = cases[i].make();

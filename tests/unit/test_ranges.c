@@ -581,8 +581,8 @@ static vsh_light light_of_size(int32_t type, double size) {
     vsh_light light = type == VSH_LIGHT_DIRECTIONAL ? sun(truth_seeds_sun, size) : lamp(ABOVE, size);
     light.type = type;
     light.axis[1] = -1.0;
-    light.inner_angle = 1.0;
-    light.outer_angle = 1.2;
+    light.inner_angle = 2.0;
+    light.outer_angle = 2.4;
     light.edge_u[0] = light.edge_v[2] = size;
     return light;
 }

@@ -157,8 +157,8 @@ TEST(every_key_lands_in_its_field) {
     assert_string_equal(l[2].name, "head_-9");
     assert_vector(l[2].axis, 0.0, -1.0, 0.0);
     assert_vector(l[2].direction, 0.0, 1.0, 0.0); /* a sun's, as it was */
-    assert_near(l[2].inner_angle, PI / 6.0, 1e-15);
-    assert_true(l[2].outer_angle == PI);
+    assert_near(l[2].inner_angle, PI / 3.0, 1e-15);
+    assert_true(l[2].outer_angle == 2.0 * PI);
 
     const vsh_grid_options *g = &scene->grid;
     assert_true(g->voxel_size == 0.0 && g->resolution == 64 && g->half_width == 4.5 &&
