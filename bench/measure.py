@@ -299,9 +299,9 @@ def over_horizon(light, at, up):
 
 def proved(occluders, at, up, light):
     """Values, and which of them are proved: those without a remaining error."""
-    deviation = numpy.empty(len(at), numpy.float32)
-    values = v.shade_shadow(occluders, at, up, light, deviation=deviation, method="exact", rays=8, max_error=1.0)
-    return values, (deviation == 0) & over_horizon(light, at, up)
+    error = numpy.empty(len(at), numpy.float32)
+    values = v.shade_shadow(occluders, at, up, light, error=error, method="exact", rays=8, max_error=1.0)
+    return values, (error == 0) & over_horizon(light, at, up)
 
 
 def proofs():

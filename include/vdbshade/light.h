@@ -250,18 +250,18 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
 
 /* Writes the fraction of the light that each point sees, 0 dark … 1 lit, to visibility[count]: before cosine,
  * colour and falloff (a spot's edge is falloff). Points that face away from the light, or lie beyond its
- * reach or cone, get 0, points inside it 1, invalid ones NaN. `deviation` [count] (may be NULL) receives the
- * standard error left: 0 if a cone proved the value, an estimate if rays gave it, NaN if the method knows
+ * reach or cone, get 0, points inside it 1, invalid ones NaN. `shadow_error` [count] (may be NULL) receives
+ * the standard error left: 0 if a cone proved the value, an estimate if rays gave it, NaN if the method knows
  * none. Uses up to 512 KB of each thread's stack, the caller's too. Errors (the arrays are then undefined):
  * VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run, and as vsh_light_check()),
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
                                     const vsh_light *light, const vsh_shade_options *options,
-                                    const vsh_run *run, float *visibility, float *deviation,
+                                    const vsh_run *run, float *visibility, float *shadow_error,
                                     vsh_shade_stats *stats, vsh_error *error);
 
 /* Writes the cosine-weighted fraction of the hemisphere that is free within ao_distance, 0 … 1 open, to
- * ao[count]; NaN for invalid points. `deviation` as above. `bent` [count][3] (may be NULL) receives bent
+ * ao[count]; NaN for invalid points. `ao_error` as above. `bent` [count][3] (may be NULL) receives bent
  * normals: the mean of the open directions, unit, world space; the normal if none is open, NaN for invalid
  * points (Landis, "Production-ready global illumination", 2002). Layers' directions are superposed, which is
  * exact if they hide different parts of the sky. Errors (the arrays are then undefined): VSH_ERROR_ARGUMENT
@@ -269,7 +269,7 @@ VSH_API vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_po
  * VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
-                                float *deviation, float *bent, vsh_shade_stats *stats, vsh_error *error);
+                                float *ao_error, float *bent, vsh_shade_stats *stats, vsh_error *error);
 
 /* Colours of penumbrae: red reaches farther into the shadow (Quilez, "outdoors lighting", 2013). V is the
  * visibility. */
@@ -309,10 +309,10 @@ VSH_API void vsh_query_free(vsh_query *query); /* NULL does nothing */
  * vsh_shade_shadow(), vsh_shade_ao() and vsh_field_sample(). */
 typedef struct vsh_query_output {
     size_t struct_size;
-    float *const *visibility; /* [light_count] arrays [count]; each, or all, may be NULL */
-    float *const *deviation;  /* [light_count] arrays [count]: standard errors of the visibilities */
-    float *ao;                /* [count]; needs normals */
-    float *ao_deviation;      /* [count], with `ao` */
+    float *const *visibility;   /* [light_count] arrays [count]; each, or all, may be NULL */
+    float *const *shadow_error; /* [light_count] arrays [count]: standard errors of the visibilities */
+    float *ao;                  /* [count]; needs normals */
+    float *ao_error;            /* [count], with `ao` */
     float *distance; /* [count], signed, world units, of the point itself without start offset; NaN if its
                         position is not finite */
     float *gradient; /* [count][3], unit: the direction of growing distance, which is the normal next to a
@@ -357,11 +357,11 @@ enum { VSH_QUERY_BATCH = 1 << 20 };
  * neighbours share proofs and memory.
  *
  * Values of AO, of rays and of shadows by one finished march do not depend on the other points of a call by
- * any bit. Shadows by adaptive and exact do, within their error, as do deviations of shadows by rays. Calls
+ * any bit. Shadows by adaptive and exact do, within their error, as do errors of shadows by rays. Calls
  * with VSH_QUERY_BATCH points each, with the points' numbers as `texels`, give the bits of one call.
  *
  * Errors (the arrays are then undefined): VSH_ERROR_ARGUMENT (run, a struct_size, a bad stride, positions of
- * both kinds or of neither, a deviation without its values, AO without normals), VSH_ERROR_LIMIT (occluders
+ * both kinds or of neither, errors without their values, AO without normals), VSH_ERROR_LIMIT (occluders
  * and order exceed run->memory_limit), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points,
                                     const vsh_point_layout *layout, const vsh_run *run,

@@ -321,9 +321,9 @@ static bool shade_piece(volume_bake *bake, piece *p, const facts *known, vsh_sha
     const vsh_points points = {p->count, &p->centre[0][0], bake->normals ? &p->normal[0][0] : NULL, p->texel};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = p->to;
-    output.deviation = bake->shadow_error ? p->to + bake->light_count + ao : NULL;
+    output.shadow_error = bake->shadow_error ? p->to + bake->light_count + ao : NULL;
     output.ao = ao ? p->to[bake->light_count] : NULL;
-    output.ao_deviation = bake->ao_error ? p->to[bake->channel_count - 1] : NULL;
+    output.ao_error = bake->ao_error ? p->to[bake->channel_count - 1] : NULL;
     /* the caller gives none of this, so only memory can fail */
     if (vsh_query_points(bake->query, &points, NULL, &bake->one, &output, stats, NULL) != VSH_OK) {
         return false;

@@ -262,7 +262,7 @@ static void shade_piece(const void *user, size_t begin, size_t end, vsh_shade_st
                                call->view.normals != NULL ? &p.normals[0][0] : NULL, p.texels};
     for (size_t l = 0; output->visibility != NULL && l < call->query->light_count; ++l) {
         if (output->visibility[l] != NULL) {
-            float *deviation = array_of(output->deviation, l);
+            float *deviation = array_of(output->shadow_error, l);
             vshi_shadow_task task = call->query->shadow[l];
             task.kernel = call->kernel;
             task.points = &points;
@@ -280,10 +280,10 @@ static void shade_piece(const void *user, size_t begin, size_t end, vsh_shade_st
         task.points = &points;
         task.faces = call->faces != NULL ? &p.faces[0][0] : NULL;
         task.ao = p.values;
-        task.deviation = output->ao_deviation != NULL ? p.deviations : NULL;
+        task.deviation = output->ao_error != NULL ? p.deviations : NULL;
         vshi_ao_shade(&task, 0, p.count, stats);
         scatter(&p, 1, p.values, output->ao);
-        scatter(&p, 1, p.deviations, output->ao_deviation);
+        scatter(&p, 1, p.deviations, output->ao_error);
     }
     if (output->distance != NULL || output->gradient != NULL) {
         measure(call, p.count, points.positions, p.values,
@@ -325,14 +325,14 @@ static vsh_result check_output(const vsh_query *query, const point_view *view, c
     *any = output->ao != NULL || output->distance != NULL || output->gradient != NULL;
     for (size_t l = 0; l < query->light_count; ++l) {
         const bool asked = array_of(output->visibility, l) != NULL;
-        if (!asked && array_of(output->deviation, l) != NULL) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: deviation of light %zu without visibility",
-                             l);
+        if (!asked && array_of(output->shadow_error, l) != NULL) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "output: shadow_error of light %zu without visibility", l);
         }
         *any = *any || asked;
     }
-    if (output->ao == NULL && output->ao_deviation != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: ao_deviation without ao");
+    if (output->ao == NULL && output->ao_error != NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "output: ao_error without ao");
     }
     if ((output->distance != NULL || output->gradient != NULL) && query->ao.field->unknown) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,

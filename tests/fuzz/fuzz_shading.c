@@ -72,9 +72,9 @@ static void query(fuzz_input *input) {
     layout.texel_stride = 4;
     float *const planes[] = {visibility};
     output.visibility = how & 16 ? planes : NULL;
-    output.deviation = NULL;
+    output.shadow_error = NULL;
     output.ao = how & 32 ? ao : NULL;
-    output.ao_deviation = NULL;
+    output.ao_error = NULL;
     output.distance = how & 64 ? distance : NULL;
     output.gradient = how & 128 ? gradient : NULL;
     fuzz_fill(input, positions, 3 * POINTS * sizeof *positions);

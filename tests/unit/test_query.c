@@ -49,9 +49,9 @@ static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int
     float *const deviation[LIGHTS] = {deviations[0], deviations[1]};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = visibility;
-    output.deviation = deviation;
+    output.shadow_error = deviation;
     output.ao = values[LIGHTS];
-    output.ao_deviation = deviations[LIGHTS];
+    output.ao_error = deviations[LIGHTS];
     vsh_run run = run_on(threads);
     vsh_shade_stats stats = vsh_shade_stats_zero();
     assert_ok(vsh_query_points(query, points, NULL, &run, &output, &stats, &failure));
@@ -254,11 +254,11 @@ TEST(bad_arguments_are_refused_by_name) {
     const vsh_points bare = {FEW, positions, NULL, NULL};
     float *const deviation[LIGHTS] = {NULL, values[0]};
     vsh_query_output outputs[4];
-    static const char *const parts[4] = {"normals", "ao_deviation", "light 1", ""};
+    static const char *const parts[4] = {"normals", "ao_error", "light 1", ""};
     outputs[0] = outputs[1] = outputs[2] = outputs[3] = vsh_query_output_default();
     outputs[0].ao = values[0];
-    outputs[1].ao_deviation = values[0];
-    outputs[2].deviation = deviation;
+    outputs[1].ao_error = values[0];
+    outputs[2].shadow_error = deviation;
     outputs[3].struct_size = 0;
     for (int i = 0; i < 4; ++i) {
         assert_fails(vsh_query_points(good, &bare, NULL, NULL, &outputs[i], NULL, &failure),
@@ -308,7 +308,7 @@ static vsh_query_output packed_output(void) {
     static float *const shadow[1] = {visibility}, *const error[1] = {errors};
     vsh_query_output output = vsh_query_output_default();
     output.visibility = shadow;
-    output.deviation = error;
+    output.shadow_error = error;
     output.ao = open;
     output.distance = distance;
     output.gradient = gradient;
@@ -348,7 +348,7 @@ TEST(strides_floats_and_gaps_give_the_bits_of_packed_arrays) {
             float *const shadow[1] = {&vertices[0].visibility}, *const error[1] = {&vertices[0].deviation};
             vsh_query_output output = vsh_query_output_default();
             output.visibility = shadow;
-            output.deviation = error;
+            output.shadow_error = error;
             output.ao = &vertices[0].ao;
             output.distance = &vertices[0].distance;
             output.gradient = vertices[0].gradient;

@@ -18,8 +18,8 @@ typedef struct query_answers {
     size_t lights;
     const vsh_light *light;
     bool ao, distance, gradient;
-    bool shadow_error, ao_error;     /* standard errors, if the method knows them */
-    float **visibility, **deviation; /* [lights] */
+    bool shadow_error, ao_error;  /* standard errors, if the method knows them */
+    float **visibility, **errors; /* [lights] */
     vsh_query_output output;
     cli_points_answers rows;
 } query_answers;
@@ -139,19 +139,19 @@ static void create_answers(query_answers *a, size_t room) {
     a->rows.values = malloc(room * floats * sizeof *a->rows.values);
     a->rows.names = calloc(floats, sizeof *a->rows.names);
     a->visibility = calloc(a->lights + 1, sizeof *a->visibility);
-    a->deviation = calloc(a->lights + 1, sizeof *a->deviation);
+    a->errors = calloc(a->lights + 1, sizeof *a->errors);
     a->output = vsh_query_output_default();
     a->output.stride = floats * sizeof(float);
     a->output.visibility = a->visibility;
-    a->output.deviation = a->deviation;
+    a->output.shadow_error = a->errors;
     for (size_t l = 0; l < a->lights; ++l) {
         a->visibility[l] = add_column(a, "shadow.", a->light[l].name);
     }
     a->output.ao = a->ao ? add_column(a, "ao", "") : NULL;
     for (size_t l = 0; a->shadow_error && l < a->lights; ++l) {
-        a->deviation[l] = add_column(a, "error.", a->light[l].name);
+        a->errors[l] = add_column(a, "error.", a->light[l].name);
     }
-    a->output.ao_deviation = a->ao && a->ao_error ? add_column(a, "error.", "ao") : NULL;
+    a->output.ao_error = a->ao && a->ao_error ? add_column(a, "error.", "ao") : NULL;
     a->output.distance = a->distance ? add_column(a, "distance", "") : NULL;
     if (a->gradient) {
         a->output.gradient = add_column(a, "gradient", ".x");
@@ -330,7 +330,7 @@ static int query_main(int argc, char **argv) {
     free(work.answers.rows.values);
     free(work.answers.rows.names);
     free(work.answers.visibility);
-    free(work.answers.deviation);
+    free(work.answers.errors);
     vsh_query_free(work.query);
     cli_shading_free(&work.shading);
     cli_points_close(&work.reader);

@@ -45,7 +45,7 @@ def _written(out: Optional[numpy.ndarray], shape: Tuple[int, ...], name: str) ->
 
 def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[ArrayLike], light: Light, *,
                  texels: Optional[ArrayLike] = None, out: Optional[numpy.ndarray] = None,
-                 deviation: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
+                 error: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
                  **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
     """Fraction of a light that each point sees, 0 dark … 1 lit: before any cosine, colour or falloff.
 
@@ -57,7 +57,7 @@ def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[A
         away from the solid, of any length; None: no horizon
     texels : array of uint32, shape (n,), optional
         column + 65536 row of each in a lightmap
-    out, deviation : array of float32, shape (n,), optional
+    out, error : array of float32, shape (n,), optional
         to be written into: the values, and the standard error left in them
     **options
         vdbshade.types.ShadeOptions: method, max_error, rays, sampler, …
@@ -70,12 +70,12 @@ def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[A
     points, count = _points(positions, normals, texels)
     values = output(out, numpy.float32, (count,), "out")
     call(lib.vsh_shade_shadow, occluders, points, light, Filled("vsh_shade_options", options), values,
-         _written(deviation, (count,), "deviation"), stats, run=run)
+         _written(error, (count,), "error"), stats, run=run)
     return values
 
 
 def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, texels: Optional[ArrayLike] = None,
-             out: Optional[numpy.ndarray] = None, deviation: Optional[numpy.ndarray] = None,
+             out: Optional[numpy.ndarray] = None, error: Optional[numpy.ndarray] = None,
              bent: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
              **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
     """Cosine-weighted fraction of the hemisphere that is free within ``ao_distance`` (world units), 0 … 1 open.
@@ -84,7 +84,7 @@ def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, 
     """
     points, count = _points(positions, numpy.asarray(normals), texels)
     values = output(out, numpy.float32, (count,), "out")
-    call(lib.vsh_shade_ao, occluders, points, Filled("vsh_shade_options", options), values, _written(deviation, (count,), "deviation"),
+    call(lib.vsh_shade_ao, occluders, points, Filled("vsh_shade_options", options), values, _written(error, (count,), "error"),
          _written(bent, (count, 3), "bent"), stats, run=run)
     return values
 
@@ -154,7 +154,7 @@ class Query(Handle, kind="vsh_query"):
         self.names: List[str] = names_of(structs, count)
 
     def points(self, positions: ArrayLike, normals: Optional[ArrayLike] = None, *, shadow: bool = True, ao: bool = False,
-               deviation: bool = False, distance: bool = False, gradient: bool = False, texels: Optional[ArrayLike] = None,
+               error: bool = False, distance: bool = False, gradient: bool = False, texels: Optional[ArrayLike] = None,
                out: Optional[Dict[str, numpy.ndarray]] = None, stats: Optional[Stats] = None,
                run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
         """Shades points.
@@ -165,7 +165,7 @@ class Query(Handle, kind="vsh_query"):
             world units. Rows may be apart, as in a structured array: nothing is copied
         normals : array of float32, shape (n, 3), optional
             likewise; needed for AO
-        shadow, ao, deviation, distance, gradient : bool
+        shadow, ao, error, distance, gradient : bool
             wanted values
         texels : array of uint32, shape (n,), optional
         out : dict of arrays, optional
@@ -175,7 +175,7 @@ class Query(Handle, kind="vsh_query"):
         -------
         dict
             of arrays of float32: "shadow" (lights, n), "ao" (n,), "distance" (n,), "gradient" (n, 3),
-            "shadow_deviation" (lights, n), "ao_deviation" (n,)
+            "shadow_error" (lights, n), "ao_error" (n,)
 
         Notes
         -----
@@ -192,10 +192,10 @@ class Query(Handle, kind="vsh_query"):
             layout = ffi.new("vsh_point_layout *", [ffi.sizeof("vsh_point_layout"), first if single else ffi.NULL, stride, up_stride,
                                                      number_stride])
         lights = self.light_count
-        shapes = dict(shadow=(lights, count), shadow_deviation=(lights, count), ao=(count,), ao_deviation=(count,), distance=(count,),
+        shapes = dict(shadow=(lights, count), shadow_error=(lights, count), ao=(count,), ao_error=(count,), distance=(count,),
                       gradient=(count, 3))
         if out is None:
-            asked = dict(shadow=shadow and lights, shadow_deviation=shadow and lights and deviation, ao=ao, ao_deviation=ao and deviation,
+            asked = dict(shadow=shadow and lights, shadow_error=shadow and lights and error, ao=ao, ao_error=ao and error,
                          distance=distance, gradient=gradient)
             out = {name: numpy.empty(shapes[name], _FLOAT32) for name, wanted in asked.items() if wanted}
         else:
@@ -227,12 +227,12 @@ class Query(Handle, kind="vsh_query"):
         for name, array_of in out.items() if count else ():
             first = ffi.from_buffer("float[]", array_of, require_writable=True)
             keeps.append(first)
-            if name not in ("shadow", "shadow_deviation"):
+            if name not in ("shadow", "shadow_error"):
                 setattr(values, name, first)
             elif self.light_count:
                 planes = ffi.new("float *[]", [first + i * count for i in range(self.light_count)])
                 keeps.append(planes)
-                setattr(values, "visibility" if name == "shadow" else "deviation", planes)
+                setattr(values, "visibility" if name == "shadow" else "shadow_error", planes)
         return values, keeps
 
 
