@@ -10,6 +10,8 @@
  *         fprintf(stderr, "%s\n", error.message);
  *     }
  *
+ * Link with -lvdbshade -lm: inline functions of the headers use sqrt().
+ *
  * These rules hold for every call:
  *
  * - The library prints nothing, never exits, and keeps no mutable global state. Only calls that take a
@@ -45,10 +47,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* Marks the functions of the library. */
-#if defined(VSH_BUILD) && defined(__GNUC__)
-#define VSH_API __attribute__((visibility("default")))
-#elif defined(_WIN32)
+/* Marks the functions of the library. VSH_BUILD is defined while the library itself is compiled. Programs for
+ * Windows that link the static library define VSH_STATIC. */
+#if defined(_WIN32) && defined(VSH_BUILD)
+#define VSH_API __declspec(dllexport)
+#elif defined(_WIN32) && !defined(VSH_STATIC)
 #define VSH_API __declspec(dllimport)
 #elif defined(__GNUC__) && !defined(_WIN32)
 #define VSH_API __attribute__((visibility("default")))
