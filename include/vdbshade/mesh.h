@@ -16,7 +16,7 @@
 
 VSH_BEGIN_C
 
-enum { VSH_MAX_UV_SETS = 8 };
+enum { VSH_MAX_UV_SETS = 8, VSH_MAX_STRIDE = 65536 };
 
 /* Whether a mesh encloses a solid. AUTO decides for each connected component. Closed components, and open
  * ones that enclose nearly all of what lies behind their faces, are solid if their faces look outwards. If
@@ -55,7 +55,7 @@ typedef struct vsh_alpha_mask {
     double base_alpha;      /* 0 … 1 */
 } vsh_alpha_mask;
 
-/* A triangle mesh. A view: nothing is copied or owned. Zero the members that you do not need. */
+/* A triangle mesh. A view: nothing is owned. Zero the members that you do not need. */
 typedef struct vsh_mesh {
     const char *name;        /* for messages; may be NULL */
     const float *positions;  /* [vertex_count][3], local units, finite */
@@ -77,6 +77,11 @@ typedef struct vsh_mesh {
     const float *mask_uvs; /* [vertex_count][2], texture coordinates for `mask`, v up. Triangles with values
                               that are not finite are opaque */
     const char *material_name; /* may be NULL */
+    const uint16_t *indices16; /* instead of `indices`, which must then be NULL */
+    size_t
+        position_stride;  /* bytes between consecutive positions, normals and UVs, multiples of 4, at most */
+    size_t normal_stride; /* VSH_MAX_STRIDE; 0: tightly packed. Calls copy arrays with strides, and */
+    size_t uv_stride;     /* 16-bit indices, while they run; charts keep the copies. Not for vsh_render() */
 } vsh_mesh;
 
 /* Findings of vsh_mesh_check(). Vertices at equal positions count as one, so UV seams do not open edges. */
@@ -90,8 +95,8 @@ typedef struct vsh_mesh_report {
 } vsh_mesh_report;
 
 /* Checks a mesh, except its UVs and normals. Errors (*report is then unchanged):
- * - VSH_ERROR_ARGUMENT: mesh or report NULL; an array NULL whose count is not 0; more than 2^32 - 1
- *   vertices;
+ * - VSH_ERROR_ARGUMENT: mesh or report NULL; an array NULL whose count is not 0; indices of both sizes; a
+ *   stride out of range; more than 2^32 - 1 vertices;
  * - VSH_ERROR_INPUT: a vertex that is not finite, before or after its transform; an index out of range; a
  *   transform that is not finite or flattens;
  * - VSH_ERROR_MEMORY. */

@@ -1,5 +1,6 @@
 #include "geometry/mesh.h"
 
+#include "base/memory.h"
 #include "base/vec.h"
 
 #include <stdio.h>
@@ -48,9 +49,14 @@ vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_err
     return VSH_OK;
 }
 
-vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error) {
+static bool is_loose(const vsh_mesh *mesh) {
+    return mesh->indices16 != NULL || mesh->position_stride != 0 || mesh->normal_stride != 0 ||
+           mesh->uv_stride != 0;
+}
+
+static vsh_result check_arrays(const vsh_mesh *mesh, size_t index, vsh_error *error) {
     if ((mesh->positions == NULL && mesh->vertex_count > 0) ||
-        (mesh->indices == NULL && mesh->triangle_count > 0)) {
+        (mesh->indices == NULL && mesh->indices16 == NULL && mesh->triangle_count > 0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s are NULL", vshi_mesh_label(mesh, index).text,
                          mesh->positions == NULL && mesh->vertex_count > 0 ? "positions" : "indices");
     }
@@ -59,6 +65,15 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
                          "%s: %zu vertices and %zu triangles, at most %u and %zu can be addressed",
                          vshi_mesh_label(mesh, index).text, mesh->vertex_count, mesh->triangle_count,
                          UINT32_MAX, SIZE_MAX / 64);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error) {
+    VSHI_TRY(check_arrays(mesh, index, error));
+    if (is_loose(mesh)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: strides and 16-bit indices are not taken here",
+                         vshi_mesh_label(mesh, index).text);
     }
     VSHI_TRY(vshi_mesh_check_transform(mesh, index, error));
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
@@ -78,6 +93,103 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
                              vshi_mesh_label(mesh, index).text, i / 3, mesh->indices[i], mesh->vertex_count);
         }
     }
+    return VSH_OK;
+}
+
+/* --- strides and 16-bit indices */
+
+/* An array of vertices: its members in vsh_mesh, and its floats a vertex. */
+static const struct {
+    const char *name;
+    size_t array, stride, floats;
+} vertex_arrays[] = {
+    {"position_stride", offsetof(vsh_mesh, positions), offsetof(vsh_mesh, position_stride), 3},
+    {"normal_stride", offsetof(vsh_mesh, normals), offsetof(vsh_mesh, normal_stride), 3},
+    {"uv_stride", offsetof(vsh_mesh, uvs), offsetof(vsh_mesh, uv_stride), 2},
+};
+enum { VERTEX_ARRAYS = sizeof vertex_arrays / sizeof vertex_arrays[0] };
+
+static size_t *stride_of(vsh_mesh *mesh, int array) {
+    return (size_t *)((char *)mesh + vertex_arrays[array].stride);
+}
+
+static const float **floats_of(vsh_mesh *mesh, int array) {
+    return (const float **)((char *)mesh + vertex_arrays[array].array);
+}
+
+/* Checks a loose mesh, a copy of the caller's struct, and adds the elements of 4 bytes that its arrays take.
+ */
+static vsh_result measure(vsh_mesh *mesh, size_t index, size_t *elements, vsh_error *error) {
+    VSHI_TRY(check_arrays(mesh, index, error));
+    if (mesh->indices != NULL && mesh->indices16 != NULL) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: both indices and indices16: expected one of them",
+                         vshi_mesh_label(mesh, index).text);
+    }
+    *elements += mesh->indices16 != NULL ? 3 * mesh->triangle_count : 0;
+    for (int a = 0; a < VERTEX_ARRAYS; ++a) {
+        const size_t stride = *stride_of(mesh, a), size = vertex_arrays[a].floats * sizeof(float);
+        if (stride != 0 && (stride < size || stride > VSH_MAX_STRIDE || stride % sizeof(float) != 0)) {
+            return vshi_fail(
+                error, VSH_ERROR_ARGUMENT, "%s: %s %zu: expected 0, or a multiple of 4 from %zu to %d",
+                vshi_mesh_label(mesh, index).text, vertex_arrays[a].name, stride, size, VSH_MAX_STRIDE);
+        }
+        const bool copied = stride != 0 && *floats_of(mesh, a) != NULL;
+        *elements += copied ? vertex_arrays[a].floats * mesh->vertex_count : 0;
+    }
+    return VSH_OK;
+}
+
+/* Copies the loose arrays of a mesh; returns the place behind them. */
+static char *copy_arrays(vsh_mesh *mesh, char *to) {
+    mesh->checked = NULL;
+    if (mesh->indices16 != NULL) {
+        uint32_t *indices = (uint32_t *)(void *)to;
+        for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
+            indices[i] = mesh->indices16[i];
+        }
+        mesh->indices = indices;
+        mesh->indices16 = NULL;
+        to += 3 * mesh->triangle_count * sizeof *indices;
+    }
+    for (int a = 0; a < VERTEX_ARRAYS; ++a) {
+        const char *from = (const char *)*floats_of(mesh, a);
+        const size_t stride = *stride_of(mesh, a), size = vertex_arrays[a].floats * sizeof(float);
+        *stride_of(mesh, a) = 0;
+        if (stride == 0 || from == NULL) {
+            continue;
+        }
+        *floats_of(mesh, a) = (const float *)(void *)to;
+        for (size_t v = 0; v < mesh->vertex_count; ++v, to += size) {
+            memcpy(to, from + stride * v, size);
+        }
+    }
+    return to;
+}
+
+vsh_result vshi_meshes_tighten(const vsh_mesh *meshes, size_t count, vshi_tight_meshes *tight,
+                               vsh_error *error) {
+    *tight = (vshi_tight_meshes){.meshes = meshes};
+    size_t loose = 0, elements = 0;
+    for (size_t m = 0; m < count; ++m) {
+        vsh_mesh mesh = meshes[m];
+        if (is_loose(&mesh)) {
+            VSHI_TRY(measure(&mesh, m, &elements, error));
+            ++loose;
+        }
+    }
+    if (loose == 0) {
+        return VSH_OK;
+    }
+    const size_t structs = count * sizeof *meshes;
+    VSHI_TRY(vshi_allocate(&tight->memory, 1, structs + elements * sizeof(float), "meshes", error));
+    vsh_mesh *copies = tight->memory;
+    memcpy(copies, meshes, structs);
+    char *to = (char *)tight->memory + structs;
+    for (size_t m = 0; m < count; ++m) {
+        to = is_loose(&copies[m]) ? copy_arrays(&copies[m], to) : to;
+    }
+    tight->meshes = copies;
+    tight->bytes = structs + elements * sizeof(float);
     return VSH_OK;
 }
 

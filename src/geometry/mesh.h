@@ -37,8 +37,20 @@ static inline size_t vshi_mesh_object_size(const vsh_mesh *meshes, size_t first,
  * place in a list, for messages. */
 vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
-/* The same, without the knowledge of earlier checks. */
+/* The same, without the knowledge of earlier checks. Refuses strides and 16-bit indices. */
 vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error);
+
+/* Meshes without strides and 16-bit indices: the caller's own, or copies in `memory`. */
+typedef struct vshi_tight_meshes {
+    const vsh_mesh *meshes; /* [count] */
+    void *memory;           /* free() it; NULL: there are no copies */
+    size_t bytes;           /* of the copies */
+} vshi_tight_meshes;
+
+/* Copies the meshes that have strides or 16-bit indices. Errors: VSH_ERROR_ARGUMENT (arrays, counts and
+ * strides), VSH_ERROR_MEMORY. */
+VSHI_SHARED vsh_result vshi_meshes_tighten(const vsh_mesh *meshes, size_t count, vshi_tight_meshes *tight,
+                                           vsh_error *error);
 
 /* Checks that a transform is finite and does not flatten. */
 vsh_result vshi_mesh_check_transform(const vsh_mesh *mesh, size_t index, vsh_error *error);

@@ -54,8 +54,10 @@ static vsh_result check_mesh(const vsh_mesh *mesh, size_t index, vsh_mesh_report
     return VSH_OK;
 }
 
-vsh_result vshi_mesh_set_create(const vsh_mesh *meshes, size_t count, vshi_mesh_set *set, vsh_error *error) {
+vsh_result vshi_mesh_set_create(const vsh_mesh *given, size_t count, vshi_mesh_set *set, vsh_error *error) {
     *set = (vshi_mesh_set){0};
+    VSHI_TRY(vshi_meshes_tighten(given, count, &set->tight, error));
+    const vsh_mesh *meshes = set->tight.meshes;
     VSHI_TRY(vshi_allocate((void **)&set->meshes, count, sizeof *set->meshes, "meshes", error));
     VSHI_TRY(vshi_allocate((void **)&set->checked, count, sizeof *set->checked, "meshes", error));
     set->count = count;
@@ -83,6 +85,7 @@ void vshi_mesh_set_free(vshi_mesh_set *set) {
     vshi_solidity_free(set->own);
     free(set->checked);
     free(set->meshes);
+    free(set->tight.memory);
     *set = (vshi_mesh_set){0};
 }
 
@@ -223,8 +226,13 @@ vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_err
     VSHI_NEEDS(mesh);
     VSHI_NEEDS(report);
     vsh_mesh_report found;
-    VSHI_TRY(check_mesh(mesh, VSHI_MESH_ALONE, &found, error));
-    VSHI_TRY(vshi_mesh_count_edges(mesh, &found, error));
+    vshi_tight_meshes tight;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_meshes_tighten(mesh, 1, &tight, error));
+    VSHI_TRY_DONE(check_mesh(tight.meshes, VSHI_MESH_ALONE, &found, error));
+    VSHI_TRY_DONE(vshi_mesh_count_edges(tight.meshes, &found, error));
     *report = found;
-    return VSH_OK;
+done:
+    free(tight.memory);
+    return result;
 }

@@ -21,6 +21,7 @@ typedef struct vshi_mesh_set {
     struct vsh_checked_mesh *checked; /* [count] */
     const vshi_solidity *solidity;    /* of exactly these meshes; NULL before vshi_mesh_set_solve() */
     vshi_solidity *own;               /* if the set has solved it */
+    vshi_tight_meshes tight;
 } vshi_mesh_set;
 
 /* The result of checking this unchanged mesh, or NULL. */

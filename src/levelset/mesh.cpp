@@ -8,7 +8,9 @@
 
 #include <cfloat>
 #include <cmath>
+#include <cstdlib>
 #include <map>
+#include <memory>
 #include <openvdb/tools/ChangeBackground.h>
 #include <openvdb/tools/Composite.h>
 
@@ -361,7 +363,11 @@ FloatGrid::Ptr fill_sheets(const Surface &sheets, const Lattice &lattice, Progre
     return shell;
 }
 
-vsh_grid *from_meshes(const vsh_mesh *mesh, size_t count, const vsh_grid_options *options, vsh_run run) {
+vsh_grid *from_meshes(const vsh_mesh *given, size_t count, const vsh_grid_options *options, vsh_run run) {
+    vshi_tight_meshes tight;
+    require(vshi_meshes_tighten, given, given != nullptr ? count : 0, &tight);
+    const std::unique_ptr<void, void (*)(void *)> copies(tight.memory, std::free);
+    const vsh_mesh *mesh = tight.meshes;
     Meshes meshes;
     check_meshes(mesh, count, meshes);
     const Lattice lattice = make_lattice(options, meshes.low, meshes.high);

@@ -323,7 +323,8 @@ static vsh_result make(vsh_charts *charts, const vsh_run *run, vshi_job *job, vs
     VSHI_TRY_DONE(find_sheets(charts, &set, job, run, error));
     find_bounds(charts);
     const size_t tiles = vshi_charts_tiles(sorted), triangles = sorted->first[mesh_count];
-    charts->info.bytes = sizeof *charts + sorted->bytes + triangles + tiles * sizeof *charts->samples;
+    charts->info.bytes =
+        sizeof *charts + charts->tight.bytes + sorted->bytes + triangles + tiles * sizeof *charts->samples;
     const vshi_array arrays[] = {
         VSHI_ARRAY(charts->samples, tiles),
         {(void *)&overlaps->texels, mesh_count, sizeof *overlaps->texels},
@@ -386,7 +387,8 @@ vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vs
     VSHI_TRY_DONE(vshi_begin_stage(&full_run, "charts", columns * rows, &job, error));
     made->info.width = full.width;
     made->info.height = full.height;
-    made->sorted.meshes = meshes;
+    VSHI_TRY_DONE(vshi_meshes_tighten(meshes, mesh_count, &made->tight, error));
+    made->sorted.meshes = made->tight.meshes;
     made->sorted.mesh_count = mesh_count;
     made->sorted.raster = (vshi_raster){full.width, full.height, full.supersample};
     made->fills = full.padding == VSH_PADDING_AUTO;
@@ -419,6 +421,7 @@ void vsh_charts_free(vsh_charts *charts) {
     free(charts->sorted.tile_triangle);
     free(charts->sorted.tile_start);
     free(charts->sorted.first);
+    free(charts->tight.memory);
     free(charts);
 }
 

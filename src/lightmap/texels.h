@@ -111,6 +111,7 @@ bool vshi_charts_triangle(const vshi_charts *charts, size_t mesh, size_t local, 
 struct vsh_charts {
     vsh_charts_info info;
     vshi_charts sorted;
+    vshi_tight_meshes tight; /* the caller's meshes, or copies */
     int32_t padding;
     bool fills;         /* texels beyond the padding too */
     int32_t ao_spacing; /* 1 if texels have several samples */

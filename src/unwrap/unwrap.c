@@ -370,23 +370,26 @@ done:
 
 /* --- all */
 
-vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
+vsh_result vsh_unwrap(const vsh_mesh *given, size_t mesh_count, const vsh_unwrap_options *options,
                       const vsh_run *run, vsh_atlas **atlas, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(atlas);
     *atlas = NULL;
-    VSHI_NEEDS_OF(mesh_count, meshes);
+    VSHI_NEEDS_OF(mesh_count, given);
     vsh_run full;
     vsh_unwrap_options o = vsh_unwrap_options_default();
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_options_resolve(options, &o, sizeof o, "vsh_unwrap_options", error));
     VSHI_TRY(check_options(&o, mesh_count, error));
-    VSHI_TRY(check_meshes(meshes, mesh_count, error));
+    vshi_tight_meshes tight;
     vshi_shapes shapes = {0};
     vshi_pack_item *items = NULL;
     size_t count = 0;
     vshi_pages pages = {NULL, 0};
     vsh_result result;
+    VSHI_TRY_DONE(vshi_meshes_tighten(given, mesh_count, &tight, error));
+    const vsh_mesh *meshes = tight.meshes;
+    VSHI_TRY_DONE(check_meshes(meshes, mesh_count, error));
     VSHI_TRY_DONE(vshi_shapes_find(meshes, mesh_count, &shapes, error));
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
     VSHI_TRY_DONE(vshi_shapes_lay_out(&shapes, &o, &full, error));
@@ -397,5 +400,6 @@ done:
     free(pages.list);
     free(items);
     vshi_shapes_free(&shapes);
+    free(tight.memory);
     return result;
 }

@@ -191,8 +191,12 @@ vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height, 
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "UVs measured at %d × %d: expected 1 … %d", width, height,
                          VSH_MAX_PAGE_SIZE);
     }
-    VSHI_TRY(vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error));
     vsh_uvs_measures found = {0.0, 0.0};
+    vshi_tight_meshes tight;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_meshes_tighten(mesh, 1, &tight, error));
+    mesh = tight.meshes;
+    VSHI_TRY_DONE(vshi_mesh_check_data(mesh, VSHI_MESH_ALONE, error));
     if (mesh->uvs != NULL) {
         const double size[2] = {width, height};
         sums s = {0.0, 0.0, 0.0};
@@ -205,5 +209,7 @@ vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height, 
         }
     }
     *measures = found;
-    return VSH_OK;
+done:
+    free(tight.memory);
+    return result;
 }

@@ -1,5 +1,6 @@
 /* vsh_mesh_check() against solids whose edges, area and bounds are known. */
 #include "geometry/mesh.h"
+#include "handles.h"
 #include "testing.h"
 
 #include <time.h>
@@ -329,4 +330,165 @@ TEST(a_pattern_of_many_stars_is_fast) {
     strcpy(pattern + 2000, "b");
     const vsh_mesh mesh = {.name = name};
     assert_false(vshi_mesh_matches(&mesh, pattern));
+}
+
+/* --- strides and 16-bit indices */
+
+enum { SIDE = 9, CORNERS = SIDE * SIDE, FACES = 2 * (SIDE - 1) * (SIDE - 1), SIZE = 32 };
+
+/* A vertex as engines have it. */
+typedef struct vertex {
+    float uv[2];
+    uint32_t color;
+    float position[3], normal[3];
+} vertex;
+
+/* Waves with UVs and normals that lean, once in arrays and once interleaved. */
+typedef struct waves {
+    float positions[CORNERS][3], normals[CORNERS][3], uvs[CORNERS][2];
+    uint32_t indices[FACES][3];
+    vertex vertices[CORNERS];
+    uint16_t indices16[FACES][3];
+    vsh_mesh tight, loose;
+} waves;
+
+static void make_waves(waves *w) {
+    for (int i = 0; i < CORNERS; ++i) {
+        const float x = (float)(i % SIDE), z = (float)(i / SIDE);
+        const float at[3] = {0.5f * x, 0.2f * sinf(x + 0.3f * z), 0.5f * z};
+        const float up[3] = {0.1f * cosf(x), 1.0f, 0.05f}, uv[2] = {x / (SIDE - 1), 1.0f - z / (SIDE - 1)};
+        vertex *v = &w->vertices[i];
+        memcpy(w->positions[i], at, sizeof at);
+        memcpy(w->normals[i], up, sizeof up);
+        memcpy(w->uvs[i], uv, sizeof uv);
+        memcpy(v->position, at, sizeof at);
+        memcpy(v->normal, up, sizeof up);
+        memcpy(v->uv, uv, sizeof uv);
+        v->color = UINT32_MAX; /* no number */
+    }
+    for (uint32_t i = 0; i < FACES; ++i) {
+        const uint32_t cell = i / 2, a = cell / (SIDE - 1) * SIDE + cell % (SIDE - 1), b = a + SIDE;
+        const uint32_t face[3] = {a, i % 2 == 0 ? b : b + 1, i % 2 == 0 ? b + 1 : a + 1};
+        for (int k = 0; k < 3; ++k) {
+            w->indices[i][k] = face[k];
+            w->indices16[i][k] = (uint16_t)face[k];
+        }
+    }
+    w->tight = mesh_of_arrays("waves", w->positions[0], w->uvs[0], CORNERS, w->indices[0], FACES);
+    w->tight.normals = w->normals[0];
+    w->loose = (vsh_mesh){.name = "waves",
+                          .positions = w->vertices[0].position,
+                          .normals = w->vertices[0].normal,
+                          .uvs = w->vertices[0].uv,
+                          .indices16 = w->indices16[0],
+                          .vertex_count = CORNERS,
+                          .triangle_count = FACES,
+                          .position_stride = sizeof(vertex),
+                          .normal_stride = sizeof(vertex),
+                          .uv_stride = sizeof(vertex)};
+}
+
+/* What is made of a mesh under a cube. */
+typedef struct outcome {
+    vsh_mesh_report report;
+    vsh_solidity_report solidity[2];
+    vsh_uvs_measures measures;
+    vsh_uv_report uvs;
+    vsh_grid_info grid;
+    vsh_atlas_info atlas;
+    float distances[SIZE], shadow[SIZE * SIZE], ao[SIZE * SIZE], unwrapped[3 * FACES][2];
+} outcome;
+
+static void make_outcome(const vsh_mesh *mesh, outcome *o) {
+    static const double aside[12] = {1, 0, 0, 1, 0, 1, 0, 1, 0, 0, 1, 1};
+    vsh_mesh meshes[2] = {*mesh, cube()};
+    meshes[1].transform = aside;
+    memset(o, 0, sizeof *o);
+    o->report = check(mesh);
+    assert_ok(vsh_mesh_solidity(meshes, 2, NULL, o->solidity, &failure));
+    assert_ok(vsh_uvs_measure(mesh, SIZE, SIZE, &o->measures, &failure));
+
+    vsh_grid *grid = grid_from_meshes(meshes, 2, 0.1);
+    vsh_grid_get_info(grid, &o->grid);
+    assert_ok(vsh_grid_copy(grid, (const int32_t[3]){4, 8, 15}, (const int32_t[3]){SIZE, 1, 1}, o->distances,
+                            &failure));
+    vsh_grid_free(grid);
+
+    vsh_atlas *atlas = NULL;
+    assert_ok(vsh_unwrap(mesh, 1, NULL, NULL, &atlas, &failure));
+    vsh_atlas_get_info(atlas, &o->atlas);
+    const vsh_atlas_mesh view = vsh_atlas_mesh_view(atlas, 0);
+    assert_true(view.vertex_count <= COUNT_OF(o->unwrapped));
+    memcpy(o->unwrapped, view.uvs, view.vertex_count * sizeof o->unwrapped[0]);
+    vsh_atlas_free(atlas);
+
+    vsh_lightmap_options options = vsh_lightmap_options_default();
+    options.width = options.height = SIZE;
+    vsh_occluders *occluders = NULL;
+    vsh_charts *charts = NULL;
+    vsh_light sun = vsh_light_default();
+    sun.direction[0] = 0.5;
+    float *planes[1] = {o->shadow};
+    const vsh_lightmap lightmap = {.shadow = planes, .ao = o->ao};
+    assert_ok(vsh_occluders_create(meshes, 2, NULL, NULL, &occluders, &failure));
+    assert_ok(vsh_charts_create(mesh, 1, &options, NULL, &o->uvs, &charts, &failure));
+    assert_ok(vsh_bake_lightmap(occluders, charts, &sun, 1, NULL, NULL, &lightmap, NULL, &failure));
+    vsh_charts_free(charts);
+    vsh_occluders_free(occluders);
+}
+
+TEST(an_interleaved_mesh_of_16_bit_indices_gives_the_bits_of_a_tight_one) {
+    static waves w;
+    static outcome tight, loose;
+    make_waves(&w);
+    make_outcome(&w.tight, &tight);
+    make_outcome(&w.loose, &loose);
+    assert_true(tight.report.area > 0.0 && tight.grid.active_voxels > 0 && tight.atlas.charts > 0);
+    assert_true(tight.shadow[0] > 0.0f || tight.shadow[SIZE] > 0.0f);
+    assert_memory_equal(&tight, &loose, sizeof tight);
+}
+
+TEST(strides_out_of_range_are_refused_by_mesh_value_and_limit) {
+    static waves w;
+    make_waves(&w);
+    vsh_mesh mesh;
+    const struct {
+        size_t *stride, value;
+        const char *message;
+    } cases[] = {
+        {&mesh.position_stride, 8,
+         "mesh 'waves': position_stride 8: expected 0, or a multiple of 4 from 12 to 65536"},
+        {&mesh.normal_stride, 14,
+         "mesh 'waves': normal_stride 14: expected 0, or a multiple of 4 from 12 to 65536"},
+        {&mesh.uv_stride, 65540,
+         "mesh 'waves': uv_stride 65540: expected 0, or a multiple of 4 from 8 to 65536"},
+        {NULL, 0, "mesh 'waves': both indices and indices16: expected one of them"},
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        mesh = w.loose;
+        if (cases[i].stride != NULL) {
+            *cases[i].stride = cases[i].value;
+        } else {
+            mesh.indices = w.indices[0];
+        }
+        vsh_mesh_report report;
+        vsh_solidity_report solidity;
+        vsh_uvs_measures measures;
+        vsh_occluders *occluders;
+        vsh_charts *charts;
+        vsh_atlas *atlas;
+        vsh_grid *grid;
+        const vsh_result results[] = {vsh_mesh_check(&mesh, &report, &failure),
+                                      vsh_mesh_solidity(&mesh, 1, NULL, &solidity, &failure),
+                                      vsh_uvs_measure(&mesh, SIZE, SIZE, &measures, &failure),
+                                      vsh_occluders_create(&mesh, 1, NULL, NULL, &occluders, &failure),
+                                      vsh_charts_create(&mesh, 1, NULL, NULL, NULL, &charts, &failure),
+                                      vsh_grid_from_meshes(&mesh, 1, NULL, NULL, &grid, &failure),
+                                      vsh_unwrap(&mesh, 1, NULL, NULL, &atlas, &failure)};
+        for (size_t k = 0; k < COUNT_OF(results); ++k) {
+            assert_int_equal(results[k], VSH_ERROR_ARGUMENT);
+        }
+        assert_fails(vsh_unwrap(&mesh, 1, NULL, NULL, &atlas, &failure), VSH_ERROR_ARGUMENT,
+                     cases[i].message);
+    }
 }

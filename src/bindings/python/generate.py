@@ -15,7 +15,8 @@ import cffi
 HIDDEN = {"struct_size", "user", "checked", "done", "look"}
 # Members replaced by arguments of their own.
 ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, "vsh_compare_files_options": {"limits"},
-             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"}}
+             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"},
+             "vsh_mesh": {"indices16", "position_stride", "normal_stride", "uv_stride"}}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 
 # Structs without a size that are filled by keywords.
