@@ -166,7 +166,7 @@ typedef struct vsh_run {
     size_t struct_size;        /* sizeof(vsh_run), set by vsh_run_default() */
     int32_t threads;           /* 0 … 1024; 0: all cores. Results do not depend on it */
     uint64_t memory_limit;     /* bytes that one call may hold, with the handles given to it; 0: no limit. The
-                                  call     estimates its memory first, and fails with VSH_ERROR_LIMIT */
+                                  call estimates its memory first, and fails with VSH_ERROR_LIMIT */
     vsh_progress_fn *progress; /* may be NULL */
     vsh_warning_fn *warning;   /* may be NULL */
     void *user;                /* passed to both */

@@ -161,7 +161,7 @@ typedef struct vsh_compare_files_options {
     double coverage_limit;            /* share of covered texels that may be in one file alone */
     double step;                      /* as of vsh_compare_options */
     double noise;  /* standard error that sampling leaves, in units of the range; NaN: from the max errors in
-                    * the files, if these or  the methods, samplers or frames differ */
+                    * the files, if these or the methods, samplers or frames differ */
     int32_t reach; /* as of vsh_compare_options */
     int32_t padding; /* 1: compare texels that are not covered, too */
     /* Called with the values of each measured channel; `index` is the channel's. The arrays are valid until

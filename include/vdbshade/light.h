@@ -141,7 +141,7 @@ typedef enum vsh_sampler {
     /* Owen-scrambled Sobol points (Burley, "Practical hash-based Owen scrambling", 2020) */
     VSH_SAMPLER_SOBOL = 0,
     VSH_SAMPLER_WHITE = 1, /* independent */
-    /* best-candidate points (Mitchell, 1991), rotated for each texel by a blue-noise mask   (Ulichney, "Void
+    /* best-candidate points (Mitchell, 1991), rotated for each texel by a blue-noise mask (Ulichney, "Void
        and cluster", 1993) that frames shift by the golden ratio */
     VSH_SAMPLER_BLUE = 2
 } vsh_sampler;
@@ -165,7 +165,7 @@ typedef struct vsh_shade_options {
     int32_t early_rays;  /* for rays: if this many first rays agree, skip the rest; 0: never */
     double max_error;    /* for adaptive and exact: root mean square error of the values, 1e-4 … 1 (0.02) */
     double jitter;   /* shadows by one march, except improved: shorten steps by up to this share, 0 … 1, at
-                        random   for each texel, which turns bands into grain */
+                        random for each texel, which turns bands into grain */
     double ao_up[3]; /* AO over this horizon only, any length: the free share of the directions with d · ao_up
                         > 0, which are (1 + cosine to the normal) / 2 of the hemisphere. {0, 0, 0}: all
                         directions. For rays, adaptive and exact */
@@ -233,7 +233,7 @@ typedef struct vsh_shade_stats {
     uint64_t unfinished;    /* marches that ran out of steps, which keep the value reached by then */
     uint64_t invalid;       /* points whose position or normal is not finite, or zero normals: NaN */
     uint64_t beyond_reach;  /* cones and taps beyond the field's reach (by 3 %), which may be too dark unless
-                               rays refine  them. Give the field a larger reach */
+                               rays refine them. Give the field a larger reach */
     uint64_t rays;          /* rays marched or traced */
     uint64_t refined;       /* values that needed rays */
     double square_error;    /* adaptive, exact: sum of the values' estimated squared errors */
@@ -337,7 +337,7 @@ typedef struct vsh_point_layout {
     size_t normal_stride;         /* bytes between normals */
     size_t texel_stride;          /* bytes between texels */
     const float *face_normals;    /* [count][3], unit, packed: of the faces, if points->normals are smooth. AO
-                                     leaves out    directions below the face. NULL: points->normals */
+                                     leaves out directions below the face. NULL: points->normals */
 } vsh_point_layout;
 
 static inline vsh_point_layout vsh_point_layout_default(void) {

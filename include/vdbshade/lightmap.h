@@ -77,7 +77,7 @@ typedef struct vsh_atlas_mesh {
     const uint32_t *sources; /* [vertex_count]: the vertex of the mesh that each one copies */
     const uint32_t *indices; /* [triangle_count][3], each < vertex_count */
     const uint32_t *charts;  /* [triangle_count]: index into vsh_atlas_charts(). VSH_NO_CHART for a triangle
-                                without  area, whose corners are at (0, 0) */
+                                without area, whose corners are at (0, 0) */
     size_t vertex_count;
     size_t triangle_count;
 } vsh_atlas_mesh;
@@ -307,7 +307,7 @@ typedef struct vsh_bake_stats {
     size_t struct_size;
     uint64_t texels;           /* covered */
     uint64_t invalid_texels;   /* inside a solid or behind a wall: coverage 0, filled from the nearest valid
-                                  texel of the   same chart up to 64 texels off, else from the nearest of any
+                                  texel of the same chart up to 64 texels off, else from the nearest of any
                                   within the padding (8   texels at least) */
     uint64_t *invalid_by_mesh; /* [mesh_count]; NULL: not counted */
     vsh_shade_stats shade;     /* added to */

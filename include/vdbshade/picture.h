@@ -248,7 +248,7 @@ typedef struct vsh_flat_caster {
     const double *points;     /* [point_count][2], a closed polygon of either direction, may cross itself */
     size_t point_count;       /* ≥ 3 */
     double transform[6];      /* local to world, two rows of three (column 2 translates); may mirror and scale
-                                 unevenly, but      not flatten */
+                                 unevenly, but not flatten */
 } vsh_flat_caster;
 
 /* A flat scene, from a file or filled by the caller. Paths are as the system takes them. */

@@ -94,8 +94,8 @@ typedef struct vsh_scene_layer {
     double voxel_size; /* these two as in vsh_grid_options; both 0: those of the scene */
     int32_t resolution;
     vsh_shadow_method method; /* of its shadows (VSH_SHADOW_OF_SCENE). Heightfields that are marched
-                       directly know  VSH_SHADOW_HARD and VSH_SHADOW_CLASSIC; spheres in closed form know
-                       these  and one soft method,  which replaces the others */
+                       directly know VSH_SHADOW_HARD and VSH_SHADOW_CLASSIC; spheres in closed form know
+                       these and one soft method, which replaces the others */
     vsh_combine combine;      /* with other layers */
     double softness;          /* factor on the sizes of lights, 0 (hard) … 1000 */
     double remap[2]; /* its shadow goes through a smoothstep from remap[0] (dark) to remap[1] (lit), within 0
@@ -163,7 +163,7 @@ typedef struct vsh_receiver {
     double extent[2]; /* heightfield: size in vsh_heights_source; plane: the same, flat, around the origin,
                          facing +y */
     double relief;    /* heightfield: height in vsh_heights_source. In scene files a heightfield that receives
-                         also casts,    unless a caster has its image */
+                         also casts, unless a caster has its image */
     vsh_selection objects; /* mesh: the meshes that receive */
     int32_t partial;       /* mesh: nonzero: skip meshes without UVs, or without the set, with a warning */
     int32_t allow_overlap; /* nonzero: accept objects whose UVs overlap */
@@ -393,7 +393,7 @@ typedef struct vsh_scene_occluders_options {
     int32_t voxels; /* nonzero: always make voxels, by scene->grid or the layer: for distances and other
                        methods. 0: only if they pay off */
     double points;  /* number of points to shade; 0: unknown or few. With many, rays of adaptive trace the
-                       surface of  the field */
+                       surface of the field */
 } vsh_scene_occluders_options;
 
 static inline vsh_scene_occluders_options vsh_scene_occluders_options_default(void) {

@@ -40,7 +40,8 @@ VSH_API vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const
 VSH_API vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
                                        const vsh_run *run, vsh_voxels **voxels, vsh_error *error);
 
-/* Takes the active voxels of a grid of numbers (or a mask) in a .vdb file, with those of tiles. `name` NULL: the first such grid. Use run->reader for files from strangers. Errors:
+/* Takes the active voxels of a grid of numbers (or a mask) in a .vdb file, with those of tiles. `name` NULL:
+ * the first such grid. Use run->reader for files from strangers. Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: as vsh_grid_read();
  * - VSH_ERROR_INPUT: no grids, none of that name, one without numbers (vectors, points, text) or active

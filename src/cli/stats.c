@@ -106,11 +106,11 @@ static const char *find_advice(const cli_stats *stats, const vsh_scene *scene, i
     if (by_rays && scene->shade.rays > 0) {
         return cli_keep_text("%d rays are too few; raise --rays, or leave it off", scene->shade.rays);
     }
-    if (by_rays) {
+    if (by_rays && scene->shade.sampler != VSH_SAMPLER_SOBOL) {
         return cli_keep_text("the sampler '%s' has no more rays; set \"sampler\": \"sobol\" in the scene",
                              vsh_get_name(VSH_NAMES_SAMPLER, scene->shade.sampler));
     }
-    if (stats->methods[kind].traces) {
+    if (by_rays || stats->methods[kind].traces) {
         return cli_keep_text("values between rays are interpolated; --max-error %.1g keeps it",
                              0.5 * stats->max_error);
     }

@@ -228,8 +228,8 @@ TEST(the_default_pack_has_the_first_three_channels_and_coverage) {
 /* --- color spaces: which values go through the sRGB curve, what the file says, what is cut */
 
 static const char *const IRRADIANCE[] = {"shadow.sun", "irradiance.R", "irradiance.G", "irradiance.B", "A"};
-static const vsh_channel_kind HOLDS[] = {VSH_CHANNEL_DATA, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT,
-                                VSH_CHANNEL_DATA};
+static const vsh_channel_kind HOLDS[] = {VSH_CHANNEL_DATA, VSH_CHANNEL_LIGHT, VSH_CHANNEL_LIGHT,
+                                         VSH_CHANNEL_LIGHT, VSH_CHANNEL_DATA};
 
 TEST(floats_are_linear_and_bad_spaces_are_refused) {
     static const vsh_channel_kind none[] = {0, 0, 3, 0, 0};
