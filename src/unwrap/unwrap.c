@@ -370,12 +370,12 @@ done:
 
 /* --- all */
 
-vsh_result vsh_unwrap(const vsh_mesh *given, size_t mesh_count, const vsh_unwrap_options *options,
+vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
                       const vsh_run *run, vsh_atlas **atlas, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(atlas);
     *atlas = NULL;
-    VSHI_NEEDS_OF(mesh_count, given);
+    VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     vsh_unwrap_options o = vsh_unwrap_options_default();
     VSHI_TRY(vshi_run_resolve(run, &full, error));
@@ -387,8 +387,8 @@ vsh_result vsh_unwrap(const vsh_mesh *given, size_t mesh_count, const vsh_unwrap
     size_t count = 0;
     vshi_pages pages = {NULL, 0};
     vsh_result result;
-    VSHI_TRY_DONE(vshi_meshes_tighten(given, mesh_count, &tight, error));
-    const vsh_mesh *meshes = tight.meshes;
+    VSHI_TRY_DONE(vshi_meshes_tighten(meshes, mesh_count, &tight, error));
+    meshes = tight.meshes;
     VSHI_TRY_DONE(check_meshes(meshes, mesh_count, error));
     VSHI_TRY_DONE(vshi_shapes_find(meshes, mesh_count, &shapes, error));
     VSHI_TRY_DONE(check_memory(meshes, mesh_count, &shapes, &o, &full, error));
