@@ -226,8 +226,9 @@ inputs_are() {
     sha256sum --check --quiet sums || fail "an input was replaced"
     bake level.gltf out.exr
     bake level.gltf out.exr
-    write_obj 'map_d left half.pgm'
-    refuses 2 "left half.pgm: $again" -- bake level.obj "${BAKE[@]}" --receive floor --no-cast material:leaf -o 'left half.pgm'
+    cp emblem.png 'left half.png'
+    write_obj 'map_d left half.png'
+    refuses 2 "left half.png: $again" -- bake level.obj "${BAKE[@]}" --receive floor --no-cast material:leaf -o 'left half.png'
     refuses 2 "level.mtl: $again" -- bake level.obj "${BAKE[@]}" --receive floor -o out.exr --stats level.mtl
 }
 
