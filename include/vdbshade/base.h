@@ -147,10 +147,9 @@ typedef enum vsh_names {
     VSH_NAMES_UP = 11, /* "-x" is VSH_UP_MINUS_X */
     VSH_NAMES_SEAMS = 12,
     VSH_NAMES_INSIDE = 13,
-    VSH_NAMES_FLAT = 14,       /* methods of flat scenes */
-    VSH_NAMES_FLAT_LIGHT = 15, /* VSH_LIGHT_… in a plane: "directional", "disc", "spot" */
-    VSH_NAMES_RECEIVER_UNWRAP = 16,
-    VSH_NAMES_MEASURE = 17
+    VSH_NAMES_FLAT_LIGHT = 14, /* VSH_LIGHT_… in a plane: "directional", "disc", "spot" */
+    VSH_NAMES_RECEIVER_UNWRAP = 15,
+    VSH_NAMES_MEASURE = 16
 } vsh_names;
 
 /* Returns the constant of a name: VSH_SHADOW_CONE for "cone" of VSH_NAMES_SHADOW. -1 if the name is NULL or

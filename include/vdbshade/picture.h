@@ -196,34 +196,23 @@ VSH_API vsh_result vsh_view_write_scene(const char *path, const char *name, cons
 
 /* --- flat scenes: light maps of a plane, for 2D games (docs/flat.md)
  *
- * Casters are areas of the xy-plane. Shadow is the share of the angle under which a point sees the light's
- * disc. */
-
-/* How the shadow of a flat scene is computed. */
-typedef enum vsh_flat_method {
-    VSH_FLAT_HARD = 0, /* the light's centre: 0 or 1, exact */
-    /* min h/(s t) along the ray to the centre, outer penumbra only, with h from a grid of distances and s the
-       sine of the light's half angle (Kaplan's 2D lighting after Quilez, 2010) */
-    VSH_FLAT_CLASSIC = 1,
-    VSH_FLAT_EXACT = 2 /* the union of the hidden angles, in closed form */
-} vsh_flat_method;
+ * Casters are areas of the xy-plane. Shadow is the least h/(s t) along the ray to the light's centre: h is
+ * the distance to the casters at t, from a grid with a cell a texel, and s the sine of the light's half
+ * angle. It has the outer half of the penumbra (Kaplan's 2D lighting after Quilez, 2010). */
 
 /* How a light map of a plane is made. */
 typedef struct vsh_flat_options {
     size_t struct_size;
-    int32_t width;          /* texels, 1 … 65536 */
-    int32_t height;         /* the same */
-    double region_min[2];   /* world rectangle of the map, finite, at most 1e15 in size */
-    double region_max[2];   /* the other corner; row 0 is at y = region_max[1] */
-    vsh_flat_method method; /* of shadows */
-    int32_t supersample;    /* N: N × N samples a texel, 1 … 16 */
-    int32_t padding;        /* texels that values grow by into solids, 0 … 4096; never coverage */
-    int32_t max_steps;      /* classic: steps of a march, 16 … 65536 */
+    int32_t width;        /* texels, 1 … 65536 */
+    int32_t height;       /* the same */
+    double region_min[2]; /* world rectangle of the map, finite, at most 1e15 in size */
+    double region_max[2]; /* the other corner; row 0 is at y = region_max[1] */
+    int32_t supersample;  /* N: N × N samples a texel, 1 … 16 */
+    int32_t padding;      /* texels that values grow by into solids, 0 … 4096; never coverage */
 } vsh_flat_options;
 
 static inline vsh_flat_options vsh_flat_options_default(void) {
-    vsh_flat_options options = {sizeof(vsh_flat_options), 512, 512, {-1.0, -1.0}, {1.0, 1.0},
-                                VSH_FLAT_EXACT,           1,   4,   1024};
+    vsh_flat_options options = {sizeof(vsh_flat_options), 512, 512, {-1.0, -1.0}, {1.0, 1.0}, 1, 4};
     return options;
 }
 
@@ -299,7 +288,7 @@ typedef struct vsh_flat_map {
  * - VSH_ERROR_ARGUMENT: scene or map NULL; options out of range; a light that vsh_light_check() refuses or
  *   whose direction has no length in the plane (the message gives its number); a caster of no type; run;
  * - VSH_ERROR_INPUT, VSH_ERROR_READ, VSH_ERROR_UNSUPPORTED: a caster's image, font, text or polygon;
- * - VSH_ERROR_LIMIT: run->memory_limit; with VSH_FLAT_CLASSIC more than 2^31 distances in its grid;
+ * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^31 distances in the grid;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_flat_bake(const vsh_flat_scene *scene, const vsh_run *run, const vsh_flat_map *map,
                                  vsh_error *error);

@@ -65,7 +65,6 @@ static const char *const *const tables[] = {
     [VSH_NAMES_UP] = NAMES("none", "x", "y", "z", "-x", "-y", "-z"),
     [VSH_NAMES_SEAMS] = NAMES("default", "keep", "fix"),
     [VSH_NAMES_INSIDE] = NAMES("nearest", "off"),
-    [VSH_NAMES_FLAT] = NAMES("hard", "classic", "exact"),
     [VSH_NAMES_FLAT_LIGHT] = NAMES("directional", "disc", "spot"),
     [VSH_NAMES_RECEIVER_UNWRAP] = NAMES("default", "never", "auto", "always"),
     [VSH_NAMES_MEASURE] = NAMES("nonfinite", "shift", "penumbra", "lost", "gained", "rmse", "p99", "max"),

@@ -218,12 +218,11 @@ static bool state_flat(json_t *root, const char *path) {
         return false;
     }
     const vsh_flat_options *o = &scene->options;
-    const char *method = vsh_get_name(VSH_NAMES_FLAT, o->method);
     state(root, "flat",
-          json_pack("{s:[f,f,f,f],s:o,s:s}", "region", o->region_min[0], o->region_min[1], o->region_max[0],
-                    o->region_max[1], "size", size_of(o->width, o->height), "method", method),
-          "flat scene: %g %g to %g %g, %d × %d, method %s\n", o->region_min[0], o->region_min[1],
-          o->region_max[0], o->region_max[1], o->width, o->height, method);
+          json_pack("{s:[f,f,f,f],s:o}", "region", o->region_min[0], o->region_min[1], o->region_max[0],
+                    o->region_max[1], "size", size_of(o->width, o->height)),
+          "flat scene: %g %g to %g %g, %d × %d\n", o->region_min[0], o->region_min[1], o->region_max[0],
+          o->region_max[1], o->width, o->height);
     json_t *casters = add(root, "casters", json_array()), *lights = add(root, "lights", json_array());
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const char *file = scene->casters[i].path, *type = types[scene->casters[i].type];

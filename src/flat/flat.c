@@ -1,11 +1,6 @@
-/* Light maps of a plane, texel by texel, and the exact share of a light that a point sees.
- *
- * In the light's frame, x points from the point to the light's centre. A direction is its slope y/x, and the
- * light covers the slopes -w … w. Every piece of the outline before the light hides an interval of slopes:
- * all between its two ends, whatever its shape. So a walk down the outline's tree hides the ends of each
- * piece first, and then enters only halves whose box reaches beyond the hidden slopes. It finds a contour's
- * extremes in logarithmic time. The share is the sum of the angles between the hidden intervals, so it is
- * exact. */
+/* Light maps of a plane, texel by texel: 2D distance-field lighting (Kaplan) with the soft shadow of Quilez
+ * (2010). A ray from each point to a light's centre marches through a grid of signed distances. The visible
+ * share is the least h/(s t): h is the distance at t along the ray, s the sine of the light's half angle. */
 #include "flat/flat.h"
 
 #include "base/elementary.h"
@@ -20,52 +15,18 @@
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 enum { MAX_SIZE = 65536, MAX_SUPERSAMPLE = 16, MAX_SAMPLES = MAX_SUPERSAMPLE * MAX_SUPERSAMPLE };
-enum { MAX_INTERVALS = 64, MAX_HALVINGS = 48 };
+/* Ends rays whose steps are too short to change t. Along a wall, ten steps cross a cell. */
+enum { MAX_STEPS = 16384 };
 
 /* A light as seen from a point. */
 typedef struct view {
     vshi_point point;
     vshi_point towards; /* unit, to the light's centre */
     double distance;    /* to the centre; infinite for a directional light */
-    double radius;
-    double slope; /* tangent of half the light's angle; 0: a hard light */
+    double sine;        /* of half the light's angle; 0: a hard light */
 } view;
-
-typedef struct interval {
-    double low, high;
-} interval;
-
-typedef struct hiding {
-    const vsh_outline *casters;
-    const view *view;
-    double low, high;               /* slopes to examine */
-    double sure2;                   /* squared distance up to which everything lies before the light */
-    double tangent2;                /* squared length of the tangents to the light's disc */
-    vshi_point above, below;        /* normals, world, of the directions `high` and `low`, out of the cone */
-    interval hidden[MAX_INTERVALS]; /* sorted, disjoint */
-    size_t count;
-    bool overflow;
-} hiding;
-
-/* Moves a point into the light's frame. */
-static vshi_point to_light(const view *v, vshi_point p) {
-    const double x = p.x - v->point.x, y = p.y - v->point.y;
-    return (vshi_point){x * v->towards.x + y * v->towards.y, y * v->towards.x - x * v->towards.y};
-}
-
-static vshi_point unit_normal(const view *v, double slope, double sign) {
-    const double length = sqrt(1.0 + slope * slope);
-    const double x = -sign * slope / length, y = sign / length; /* in the light's frame */
-    return (vshi_point){x * v->towards.x - y * v->towards.y, x * v->towards.y + y * v->towards.x};
-}
-
-/* The same limits as in 3D (light/light.h). */
-static double limit_slope(double tangent) {
-    return tangent < VSHI_LEAST_SINE ? 0.0 : fmin(tangent, VSHI_LARGEST_TANGENT);
-}
 
 /* False if the point is in the light's disc, and sees all of it. */
 static bool find_view(const vsh_light *light, vshi_point point, view *v) {
@@ -74,294 +35,21 @@ static bool find_view(const vsh_light *light, vshi_point point, view *v) {
         const double length = vshi_hypot(light->direction[0], light->direction[1]);
         v->towards = (vshi_point){light->direction[0] / length, light->direction[1] / length};
         v->distance = INFINITY;
-        v->radius = 0.0;
-        v->slope = limit_slope(vshi_tan(0.5 * light->angle));
+        v->sine = vshi_sin(0.5 * light->angle);
         return true;
     }
     const double x = light->position[0] - point.x, y = light->position[1] - point.y;
-    const double d = v->distance = vshi_hypot(x, y), r = v->radius = light->radius;
-    if (!(d > r)) {
+    const double d = v->distance = vshi_hypot(x, y);
+    if (!(d > light->radius)) {
         v->towards = (vshi_point){0.0, 0.0};
-        v->slope = INFINITY;
         return false;
     }
     v->towards = (vshi_point){x / d, y / d};
-    v->slope = limit_slope(r / sqrt((d - r) * (d + r))); /* d² - r² would cancel next to the light */
+    v->sine = light->radius / d;
     return true;
 }
 
-/* --- intervals */
-
-static bool is_hidden(const hiding *h, double low, double high) {
-    for (size_t i = 0; i < h->count; ++i) {
-        if (h->hidden[i].high >= high) {
-            return h->hidden[i].low <= low;
-        }
-    }
-    return false;
-}
-
-static bool all_hidden(const hiding *h) {
-    return h->count == 1 && h->hidden[0].low <= h->low && h->hidden[0].high >= h->high;
-}
-
-static void hide(hiding *h, double low, double high) {
-    low = low > h->low ? low : h->low;
-    high = high < h->high ? high : h->high;
-    if (!(low < high)) {
-        return;
-    }
-    size_t first = 0;
-    while (first < h->count && h->hidden[first].high < low) {
-        ++first;
-    }
-    size_t last = first; /* it touches the intervals first … last - 1 */
-    while (last < h->count && h->hidden[last].low <= high) {
-        low = h->hidden[last].low < low ? h->hidden[last].low : low;
-        high = h->hidden[last].high > high ? h->hidden[last].high : high;
-        ++last;
-    }
-    if (first == last && h->count == MAX_INTERVALS) {
-        h->overflow = true;
-        return;
-    }
-    memmove(h->hidden + first + 1, h->hidden + last, (h->count - last) * sizeof *h->hidden);
-    h->count = h->count + 1 - (last - first);
-    h->hidden[first] = (interval){low, high};
-}
-
-/* --- pieces of the outline */
-
-static double dot(vshi_point a, vshi_point b) {
-    return a.x * b.x + a.y * b.y;
-}
-
-/* Interpolates from a to b. At 1 it is exactly b, where the next segment begins. */
-static vshi_point interpolate(vshi_point a, vshi_point b, double t) {
-    return t >= 1.0 ? b : (vshi_point){a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
-}
-
-/* A part of a segment, by places along it. */
-typedef struct part {
-    double from, to;
-    double from_slope, to_slope; /* of the cone's edges; NAN: not at an edge */
-} part;
-
-/* Hides a part that is wholly in the cone and outside the light's disc. */
-static void hide_part(hiding *h, vshi_point a, vshi_point b, part w) {
-    const vshi_point middle = interpolate(a, b, 0.5 * (w.from + w.to));
-    const vshi_point p = interpolate(a, b, w.from), q = interpolate(a, b, w.to);
-    if (!(w.from < w.to) || dot(middle, middle) >= h->tangent2 || !(p.x > 0.0 && q.x > 0.0)) {
-        return; /* behind the light, or the point is on the segment */
-    }
-    const double s = isnan(w.from_slope) ? p.y / p.x : w.from_slope;
-    const double e = isnan(w.to_slope) ? q.y / q.x : w.to_slope;
-    hide(h, s < e ? s : e, s < e ? e : s);
-}
-
-/* Clips a part to one side of the cone's edge with this slope. at_a and at_b are the signed heights of the
- * segment's ends over the edge: positive is outside. */
-static bool clip(double at_a, double at_b, double slope, part *w) {
-    if (at_a > 0.0 && at_b > 0.0) {
-        return false;
-    }
-    const double t = at_a / (at_a - at_b);
-    if (at_a > 0.0 && t > w->from) {
-        w->from = t;
-        w->from_slope = slope;
-    } else if (at_b > 0.0 && t < w->to) {
-        w->to = t;
-        w->to_slope = slope;
-    }
-    return w->from < w->to;
-}
-
-static void hide_segment(hiding *h, vshi_point from, vshi_point to) {
-    const view *v = h->view;
-    const vshi_point a = to_light(v, from), b = to_light(v, to);
-    part whole = {0.0, 1.0, NAN, NAN};
-    if (!clip(a.y - h->high * a.x, b.y - h->high * b.x, h->high, &whole) ||
-        !clip(h->low * a.x - a.y, h->low * b.x - b.y, h->low, &whole)) {
-        return;
-    }
-    if (dot(a, a) < h->sure2 && dot(b, b) < h->sure2) {
-        hide_part(h, a, b, whole);
-        return;
-    }
-    /* without the part in the light's disc: |a + t d - c|² = r² */
-    const vshi_point d = {b.x - a.x, b.y - a.y}, c = {a.x - v->distance, a.y};
-    const double dd = dot(d, d), dc = dot(d, c), rest = dot(c, c) - v->radius * v->radius;
-    const double root2 = dc * dc - dd * rest;
-    if (!(dd > 0.0) || !(root2 > 0.0)) {
-        hide_part(h, a, b, whole);
-        return;
-    }
-    const double root = sqrt(root2), enters = (-dc - root) / dd, leaves = (-dc + root) / dd;
-    const bool before = enters<whole.to, after = leaves> whole.from;
-    hide_part(
-        h, a, b,
-        (part){whole.from, before ? enters : whole.to, whole.from_slope, before ? NAN : whole.to_slope});
-    hide_part(h, a, b,
-              (part){after ? leaves : whole.from, whole.to, after ? NAN : whole.from_slope, whole.to_slope});
-}
-
-/* Slopes that a node's box may still hide. */
-typedef enum reach {
-    NOTHING,
-    PARTS,
-    WHOLE /* the whole box lies before the point and before the light */
-} reach;
-
-static reach classify_box(const hiding *h, const vshi_outline_node *node) {
-    const view *v = h->view;
-    const vshi_point half = {0.5 * (node->high[0] - node->low[0]), 0.5 * (node->high[1] - node->low[1])};
-    const vshi_point middle = {node->low[0] + half.x - v->point.x, node->low[1] + half.y - v->point.y};
-    const double up = half.x * fabs(h->above.x) + half.y * fabs(h->above.y);
-    const double down = half.x * fabs(h->below.x) + half.y * fabs(h->below.y);
-    if (dot(middle, h->above) - up >= 0.0 || dot(middle, h->below) - down >= 0.0) {
-        return NOTHING;
-    }
-    const double nearx = fmax(fabs(middle.x) - half.x, 0.0), neary = fmax(fabs(middle.y) - half.y, 0.0);
-    if (nearx * nearx + neary * neary >= h->tangent2) {
-        return NOTHING;
-    }
-    const double x = dot(middle, v->towards);
-    const double depth = half.x * fabs(v->towards.x) + half.y * fabs(v->towards.y);
-    if (x + depth <= 0.0) {
-        return NOTHING;
-    }
-    if (!(x - depth > 0.0)) {
-        return PARTS;
-    }
-    const vshi_point along_x = {half.x * v->towards.x, -half.x * v->towards.y};
-    const vshi_point along_y = {half.y * v->towards.y, half.y * v->towards.x};
-    const double y = middle.y * v->towards.x - middle.x * v->towards.y;
-    double low = INFINITY, high = -INFINITY;
-    for (int corner = 0; corner < 4; ++corner) {
-        const double sx = corner & 1 ? 1.0 : -1.0, sy = corner & 2 ? 1.0 : -1.0;
-        const double slope = (y + sx * along_x.y + sy * along_y.y) / (x + sx * along_x.x + sy * along_y.x);
-        low = slope < low ? slope : low;
-        high = slope > high ? slope : high;
-    }
-    if (is_hidden(h, low > h->low ? low : h->low, high < h->high ? high : h->high)) {
-        return NOTHING;
-    }
-    const double farx = fabs(middle.x) + half.x, fary = fabs(middle.y) + half.y;
-    return farx * farx + fary * fary < h->sure2 ? WHOLE : PARTS;
-}
-
-static void hide_outline(hiding *h) {
-    const vsh_outline *o = h->casters;
-    uint32_t stack[VSHI_OUTLINE_STACK];
-    size_t top = 0;
-    stack[top++] = 0;
-    while (top > 0 && !h->overflow) {
-        const vshi_outline_node *node = &o->nodes[stack[--top]];
-        const reach reached = classify_box(h, node);
-        if (reached == NOTHING) {
-            continue;
-        }
-        if (node->count > 0 && reached == WHOLE) {
-            const vshi_point a = to_light(h->view, o->points[node->first]);
-            const vshi_point b = to_light(h->view, o->points[node->first + node->count]);
-            const double s = a.y / a.x, e = b.y / b.x;
-            hide(h, s < e ? s : e, s < e ? e : s);
-        }
-        if (node->children != 0) {
-            stack[top++] = node->children + 1;
-            stack[top++] = node->children;
-        } else {
-            for (uint32_t i = node->first; i < node->first + node->count; ++i) {
-                hide_segment(h, o->points[i], o->points[i + 1]);
-            }
-        }
-        if (all_hidden(h)) {
-            return;
-        }
-    }
-}
-
-/* Finds the free angle between the slopes low and high. */
-static double find_free_angle(hiding *h, double low, double high, int halvings) {
-    h->low = low;
-    h->high = high;
-    h->above = unit_normal(h->view, high, 1.0);
-    h->below = unit_normal(h->view, low, -1.0);
-    h->count = 0;
-    h->overflow = false;
-    hide_outline(h);
-    const double from = vshi_atan(low), to = vshi_atan(high);
-    if (h->overflow && halvings < MAX_HALVINGS) {
-        const double middle = vshi_tan(0.5 * (from + to));
-        return find_free_angle(h, low, middle, halvings + 1) + find_free_angle(h, middle, high, halvings + 1);
-    }
-    if (h->count == 0) {
-        return to - from;
-    }
-    double sum = 0.0, at = from;
-    for (size_t i = 0; i < h->count; ++i) {
-        sum += fmax(0.0, vshi_atan(h->hidden[i].low) - at);
-        at = vshi_atan(h->hidden[i].high);
-    }
-    return sum + fmax(0.0, to - at);
-}
-
-/* Whether nothing lies between the point and the light's centre. */
-static bool sees_centre(const vsh_outline *casters, const view *v) {
-    if (casters == NULL) {
-        return true;
-    }
-    const vshi_point beside = {-v->towards.y, v->towards.x};
-    uint32_t stack[VSHI_OUTLINE_STACK];
-    size_t top = 0;
-    stack[top++] = 0;
-    while (top > 0) {
-        const vshi_outline_node *node = &casters->nodes[stack[--top]];
-        const vshi_point half = {0.5 * (node->high[0] - node->low[0]), 0.5 * (node->high[1] - node->low[1])};
-        const vshi_point middle = {node->low[0] + half.x - v->point.x, node->low[1] + half.y - v->point.y};
-        const double x = dot(middle, v->towards), y = dot(middle, beside);
-        const double depth = half.x * fabs(v->towards.x) + half.y * fabs(v->towards.y);
-        const double breadth = half.x * fabs(beside.x) + half.y * fabs(beside.y);
-        if (fabs(y) > breadth || x + depth <= 0.0 || x - depth >= v->distance) {
-            continue;
-        }
-        if (node->children != 0) {
-            stack[top++] = node->children + 1;
-            stack[top++] = node->children;
-            continue;
-        }
-        for (uint32_t i = node->first; i < node->first + node->count; ++i) {
-            const vshi_point a = to_light(v, casters->points[i]), b = to_light(v, casters->points[i + 1]);
-            if ((a.y <= 0.0) == (b.y <= 0.0)) {
-                continue;
-            }
-            const double meeting = a.x + (b.x - a.x) * (a.y / (a.y - b.y));
-            if (meeting > 0.0 && meeting < v->distance) {
-                return false;
-            }
-        }
-    }
-    return true;
-}
-
-/* Finds the visible share of the light's angle, 0 … 1; of a hard light 0 or 1. Takes 4 KB of the stack. */
-static double find_visible(const vsh_outline *casters, const view *v) {
-    if (casters == NULL) {
-        return 1.0;
-    }
-    if (!(v->slope > 0.0)) {
-        return sees_centre(casters, v) ? 1.0 : 0.0;
-    }
-    const double before = v->distance - v->radius;
-    hiding h = {.casters = casters,
-                .view = v,
-                .sure2 = before * before,
-                .tangent2 = before * (v->distance + v->radius)};
-    const double share = find_free_angle(&h, -v->slope, v->slope, 0) / (2.0 * vshi_atan(v->slope));
-    return share < 1.0 ? share : 1.0;
-}
-
-/* --- the classic method, on a grid */
+/* --- the grid */
 
 /* Signed distances to the outline on a grid. World units. */
 typedef struct grid {
@@ -420,23 +108,20 @@ static bool clip_ray(const grid *g, const view *v, double *from, double *to) {
     return *from < *to;
 }
 
-/* Technique "soft shadows in raymarched SDFs" (Quilez, 2010) in the plane, as 2D lighting uses it (Kaplan):
- * the least h/(s t) along the ray to the light's centre, 0 if it hits the outline. */
-static double find_classic(const grid *g, const view *v, int32_t max_steps) {
+/* Finds the least h/(s t) along the ray to the light's centre, at most 1; 0 if the ray hits the outline. */
+static double find_visible(const grid *g, const view *v) {
     double t = g->cell, end = v->distance;
     if (!clip_ray(g, v, &t, &end)) {
         return 1.0;
     }
-    const double sine =
-        isinf(v->distance) ? v->slope / sqrt(1.0 + v->slope * v->slope) : v->radius / v->distance;
     double least = 1.0;
-    for (int32_t step = 0; step < max_steps && t < end; ++step) {
+    for (int step = 0; step < MAX_STEPS && t < end; ++step) {
         const double h =
             sample(g, (vshi_point){v->point.x + t * v->towards.x, v->point.y + t * v->towards.y});
         if (h < MET * g->cell) {
             return 0.0;
         }
-        least = h < least * sine * t ? h / (sine * t) : least;
+        least = h < least * v->sine * t ? h / (v->sine * t) : least;
         t += fmax(h, SHORTEST_STEP * g->cell);
     }
     return least;
@@ -450,10 +135,8 @@ static vsh_result check_options(const vsh_flat_options *o, vsh_error *error) {
         int32_t value, least, most;
     } integers[] = {{"width", o->width, 1, MAX_SIZE},
                     {"height", o->height, 1, MAX_SIZE},
-                    {"method", (int32_t)o->method, 0, VSH_FLAT_EXACT},
                     {"supersample", o->supersample, 1, MAX_SUPERSAMPLE},
-                    {"padding", o->padding, 0, VSHI_MAX_PADDING},
-                    {"max_steps", o->max_steps, 16, 65536}};
+                    {"padding", o->padding, 0, VSHI_MAX_PADDING}};
     for (size_t i = 0; i < sizeof integers / sizeof integers[0]; ++i) {
         if (integers[i].value < integers[i].least || integers[i].value > integers[i].most) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "flat: %s %d: expected %d … %d", integers[i].name,
@@ -500,7 +183,7 @@ typedef struct bake {
     size_t light_count;
     vsh_flat_options options;
     const vsh_flat_map *map;
-    grid grid;       /* of the classic method */
+    grid grid;       /* without values if there are no casters */
     double texel[2]; /* size, world units */
     uint8_t *state;  /* [height][width], for padding; or NULL */
 } bake;
@@ -525,16 +208,7 @@ static double shade_point(const bake *b, const vsh_light *light, vshi_point p, d
             return 0.0;
         }
     }
-    if (!outside) {
-        return 1.0;
-    }
-    if (b->options.method == VSH_FLAT_EXACT) {
-        return find_visible(b->casters, &v);
-    }
-    if (b->options.method == VSH_FLAT_CLASSIC && b->grid.values != NULL) {
-        return find_classic(&b->grid, &v, b->options.max_steps);
-    }
-    return sees_centre(b->casters, &v) ? 1.0 : 0.0;
+    return outside && b->casters != NULL ? find_visible(&b->grid, &v) : 1.0;
 }
 
 static void bake_texel(const bake *b, size_t row, size_t column) {
@@ -619,16 +293,15 @@ static double find_margin(const bake *b) {
         sides[axis] = fmax(root->high[axis], b->options.region_max[axis]) -
                       fmin(root->low[axis], b->options.region_min[axis]);
     }
+    const double longest = vshi_hypot(sides[0], sides[1]);
     for (size_t i = 0; i < b->light_count; ++i) {
         const vsh_light *light = &b->lights[i];
-        margin = fmax(margin, light->type == VSH_LIGHT_DIRECTIONAL
-                                  ? vshi_sin(0.5 * light->angle) * vshi_hypot(sides[0], sides[1])
-                                  : light->radius);
+        margin = fmax(margin, light->type == VSH_LIGHT_DIRECTIONAL ? vshi_sin(0.5 * light->angle) * longest
+                                                                   : fmin(light->radius, longest));
     }
     return margin;
 }
 
-/* Places the grid of the classic method. */
 static vsh_result place_grid(bake *b, vsh_error *error) {
     const vshi_outline_node *root = &b->casters->nodes[0];
     const double margin = find_margin(b), cell = fmin(b->texel[0], b->texel[1]);
@@ -641,10 +314,11 @@ static vsh_result place_grid(bake *b, vsh_error *error) {
         b->grid.high[axis] = b->grid.low[axis] + (sides[axis] - 1.0) * cell;
     }
     if (!(sides[0] * sides[1] <= MAX_VALUES)) {
-        return vshi_fail(error, VSH_ERROR_LIMIT,
-                         "flat: method classic: more than 2^31 distances: the outline and the lights' widths "
-                         "are too large for texels of %g",
-                         cell);
+        return vshi_fail(
+            error, VSH_ERROR_LIMIT,
+            "flat: more than 2^31 distances: the outline and the lights' widths are too large for "
+            "texels of %g",
+            cell);
     }
     b->grid.columns = (size_t)sides[0];
     b->grid.rows = (size_t)sides[1];
@@ -661,7 +335,7 @@ static vsh_result run_rows(const vsh_run *run, const char *stage, size_t rows, s
     return result;
 }
 
-/* Takes the memory of padding and of the classic method, and fills the latter's grid. */
+/* Allocates the states for padding, and fills the grid. */
 static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
     if (b->casters == NULL) {
         return VSH_OK;
@@ -670,16 +344,14 @@ static vsh_result prepare(bake *b, const vsh_run *run, vsh_error *error) {
     const bool padded = b->options.padding > 0;
     vshi_outline_info info;
     vshi_outline_get_info(b->casters, &info);
-    double bytes = (double)info.bytes + (padded ? (double)texels * (1.0 + sizeof(int16_t)) : 0.0);
-    if (b->options.method == VSH_FLAT_CLASSIC) {
-        VSHI_TRY(place_grid(b, error));
-        bytes += (double)b->grid.columns * (double)b->grid.rows * sizeof(float);
-    }
+    VSHI_TRY(place_grid(b, error));
+    const size_t values = b->grid.columns * b->grid.rows;
+    const double bytes = (double)info.bytes + (padded ? (double)texels * (1.0 + sizeof(int16_t)) : 0.0) +
+                         (double)values * sizeof(float);
     VSHI_TRY(vshi_check_limit(run, bytes, "flat", error));
     VSHI_TRY(vshi_allocate((void **)&b->state, padded ? texels : 0, 1, "padding", error));
-    const size_t values = b->grid.columns * b->grid.rows;
     VSHI_TRY(vshi_allocate((void **)&b->grid.values, values, sizeof(float), "distances", error));
-    return values > 0 ? run_rows(run, "field", b->grid.rows, 1, fill_grid_rows, &b->grid, error) : VSH_OK;
+    return run_rows(run, "field", b->grid.rows, 1, fill_grid_rows, &b->grid, error);
 }
 
 vsh_result vshi_flat_bake(const vsh_outline *casters, const vsh_light *lights, size_t light_count,
@@ -709,14 +381,4 @@ done:
     free(b.grid.values);
     free(b.state);
     return result;
-}
-
-double vshi_flat_visibility(const vsh_outline *casters, const vsh_light *light, const double point[2]) {
-    VSHI_FLOATS;
-    const vshi_point p = {point[0], point[1]};
-    view v;
-    if (!isfinite(p.x) || !isfinite(p.y) || vsh_get_name(VSH_NAMES_FLAT_LIGHT, light->type) == NULL) {
-        return NAN;
-    }
-    return find_view(light, p, &v) ? find_visible(casters, &v) : 1.0;
 }

@@ -32,12 +32,9 @@ JSON
             {"name": "torch", "type": "spot", "position": [-3, 1], "direction": [1, -0.2], "radius": 0.1,
              "inner_deg": 10, "outer_deg": 20}]}
 JSON
-    local method
-    for method in exact classic hard; do
-        succeed flat text.json -o one.exr --threads 1 --method "$method" --quiet
-        succeed flat text.json -o seven.exr --threads 7 --method "$method" --quiet
-        cmp one.exr seven.exr
-    done
+    succeed flat text.json -o one.exr --threads 1 --quiet
+    succeed flat text.json -o seven.exr --threads 7 --quiet
+    cmp one.exr seven.exr
 }
 
 @test "options go over the scene's, and info describes it" {
@@ -47,7 +44,7 @@ JSON
     sed -i 's/"padding": 0/"padding": 0, "output": "own.exr"/' wall.json
     succeed flat wall.json --quiet
     [ -s own.exr ]
-    succeed_printing "flat scene: -2 -2 to 2 2, 64 × 64, method exact" "caster 0: box" "light 'lamp': disc" -- info wall.json
+    succeed_printing "flat scene: -2 -2 to 2 2, 64 × 64" "caster 0: box" "light 'lamp': disc" -- info wall.json
 }
 
 # spoil FROM TO: bad.json, the scene with one thing changed.
@@ -75,14 +72,13 @@ LIST
 
 @test "bad options" {
     refuse_each flat wall.json -o <<'LIST'
-2 --method hard | out.exr --method cone
 2 --size | out.exr --size 70000
 2 --supersample | out.exr --supersample 0
 2 out.txt | out.txt
 3 none/out.exr | none/out.exr
 2 wall.json | wall.json
 4 out.exr | out.exr --size 8192 --memory-limit 64MiB
-4 | out.exr --method classic --size 2048x64 --memory-limit 2MiB
+4 | out.exr --size 2048x64 --memory-limit 2MiB
 LIST
     untouched out.exr
 }

@@ -454,10 +454,7 @@ static vsh_result bake_flat(const vsh_run *run, vsh_error *error) {
     float *const shadow[] = {planes[0]}, *const irradiance[] = {planes[1], planes[2], planes[3]};
     static float coverage[FLAT_TEXELS];
     const vsh_flat_map map = {shadow, irradiance, coverage};
-    vsh_flat_options options = scene->options;
-    TRY(vshi_flat_bake(both, scene->lights, 1, &options, run, &map, error));
-    options.method = VSH_FLAT_CLASSIC;
-    TRY(vshi_flat_bake(both, scene->lights, 1, &options, run, &map, error));
+    TRY(vshi_flat_bake(both, scene->lights, 1, &scene->options, run, &map, error));
     return VSH_OK;
 }
 

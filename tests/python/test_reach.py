@@ -231,7 +231,7 @@ class Reach(Case):
 
     def test_words_are_the_librarys(self):
         kinds = re.findall(r"\bVSH_NAMES_(\w+) = (\d+)", TEXT)
-        self.assertEqual(len(kinds), 18)
+        self.assertEqual(len(kinds), 17)
         names = {prefix: functools.partial(lib.vsh_get_name, int(kind)) for prefix, kind in kinds if prefix != "FLAT_LIGHT"}
         for prefix, name in names.items():
             for number in range(20):
@@ -241,9 +241,9 @@ class Reach(Case):
                     self.assertEqual(_core.constant(enum, ffi.string(word).decode(), prefix), number, prefix)
 
     def test_a_word_of_another_enum_is_none(self):
-        self.assertEqual(list(_core.words("vsh_flat_method")), ["hard", "classic", "exact"])
+        self.assertEqual(list(_core.words("vsh_align")), ["left", "center", "right"])
         self.assertEqual(list(_core.words("vsh_channel_kind")), ["data", "light", "vector"])
-        self.refused(ValueError, "method 'mask': expected one of hard, classic, exact", _core.Filled, "vsh_flat_options", method="mask")
+        self.refused(ValueError, "align 'mask': expected one of left, center, right", _core.Filled, "vsh_text_options", align="mask")
 
     def test_options_are_those_of_the_headers_with_their_defaults(self):
         """Each option struct is begun by its defaults, and vdbshade.types tells its members."""

@@ -348,7 +348,7 @@ static void spheres(const context *c, int32_t unused, bits *b) {
     shade_layer(c, NULL, made, b);
 }
 
-static void flat_map(const context *c, int32_t method, bits *b) {
+static void flat_map(const context *c, int32_t unused, bits *b) {
     enum { SIZE = 64, TEXELS = SIZE * SIZE };
     static const double points[] = {-0.5, -0.5, 0.25, -0.5, 0.25, 0.25, 0.5, 0.5, 0.75, 0.5, 0.625, 0.875};
     static const size_t counts[] = {3, 3};
@@ -357,7 +357,6 @@ static void flat_map(const context *c, int32_t method, bits *b) {
     assert_ok(vsh_outline_from_polygons(points, counts, 2, &c->run, &outline, &failure));
     vsh_flat_options options = vsh_flat_options_default();
     options.width = options.height = SIZE;
-    options.method = method;
     vsh_light light = spot();
     light.type = VSH_LIGHT_SPHERE;
     light.position[0] = -0.75;

@@ -188,7 +188,6 @@ TEST(every_constant_has_its_name_and_every_name_its_constant) {
          {VSH_UP_NONE, VSH_UP_X, VSH_UP_Y, VSH_UP_Z, VSH_UP_MINUS_X, VSH_UP_MINUS_Y, VSH_UP_MINUS_Z}},
         {VSH_NAMES_SEAMS, "default keep fix", {VSH_SEAMS_DEFAULT, VSH_SEAMS_KEEP, VSH_SEAMS_FIX}},
         {VSH_NAMES_INSIDE, "nearest off", {VSH_INSIDE_NEAREST, VSH_INSIDE_OFF}},
-        {VSH_NAMES_FLAT, "hard classic exact", {VSH_FLAT_HARD, VSH_FLAT_CLASSIC, VSH_FLAT_EXACT}},
         {VSH_NAMES_FLAT_LIGHT,
          "directional disc spot",
          {VSH_LIGHT_DIRECTIONAL, VSH_LIGHT_SPHERE, VSH_LIGHT_SPOT}},

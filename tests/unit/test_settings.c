@@ -87,21 +87,21 @@ TEST(refused_settings_change_nothing) {
 
 TEST(settings_of_a_flat_scene_are_its_own) {
     vsh_flat_scene flat = vsh_flat_scene_default();
-    static const char *const given[][2] = {
-        {"--size", "64x32"}, {"method", "classic"}, {"supersample", "3"},      {"--padding", "7"},
-        {"max_steps", "99"}, {"--bits", "16"},      {"--color-space", "srgb"}, {"pack", "R=shadow.a"}};
+    static const char *const given[][2] = {{"--size", "64x32"},       {"supersample", "3"},
+                                           {"--padding", "7"},        {"--bits", "16"},
+                                           {"--color-space", "srgb"}, {"pack", "R=shadow.a"}};
     for (size_t i = 0; i < COUNT_OF(given); ++i) {
         assert_ok(vsh_flat_scene_set(&flat, given[i][0], given[i][1], &failure));
     }
     const vsh_flat_options *o = &flat.options;
-    assert_true(o->width == 64 && o->height == 32 && o->method == VSH_FLAT_CLASSIC && o->supersample == 3);
-    assert_true(o->padding == 7 && o->max_steps == 99 && flat.bits == 16);
+    assert_true(o->width == 64 && o->height == 32 && o->supersample == 3);
+    assert_true(o->padding == 7 && flat.bits == 16);
     assert_int_equal(flat.color_space, VSH_COLOR_SRGB);
     assert_string_equal(flat.pack, "R=shadow.a");
 
     const vsh_flat_scene before = flat;
-    assert_fails(vsh_flat_scene_set(&flat, "--method", "adaptive", &failure), VSH_ERROR_INPUT,
-                 "expected one of hard, classic, exact");
+    assert_fails(vsh_flat_scene_set(&flat, "--supersample", "17", &failure), VSH_ERROR_INPUT,
+                 "expected a whole number from 1 to 16");
     assert_fails(vsh_flat_scene_set(&flat, "--rays", "4", &failure), VSH_ERROR_ARGUMENT,
                  "no such setting of a flat scene");
     assert_memory_equal(&flat, &before, sizeof flat);
