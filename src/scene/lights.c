@@ -74,13 +74,11 @@ static vshi_key make_key(const vshi_light_member *m, int32_t dimensions) {
 static size_t list_keys(bool flat, vshi_key keys[MOST_KEYS]) {
     const uint32_t types = flat ? vshi_light_types_flat() : VSHI_ALL, falling = vshi_light_types_falling();
     const vshi_key common[] = {
-        VSHI_KEY("name", CUSTOM, AT(name), .required = VSHI_ALL, .read = read_name),
-        type_key(flat),
+        VSHI_KEY("name", CUSTOM, AT(name), .required = VSHI_ALL, .read = read_name), type_key(flat),
         VSHI_KEY("reach", NUMBER, AT(reach), .variants = falling, VSHI_POSITIVE),
         VSHI_KEY("color", VECTOR, AT(color), .count = 3, .highest = VSHI_LARGEST),
-        VSHI_KEY("falloff", NAME, AT(falloff), .variants = falling, .names = VSH_NAMES_FALLOFF),
-        VSHI_KEY("layers", LATER, .offset = 0)};
-    size_t count = flat ? 4 : 6; /* in a plane lights have neither falloff nor layers */
+        VSHI_KEY("falloff", NAME, AT(falloff), .variants = falling, .names = VSH_NAMES_FALLOFF)};
+    size_t count = flat ? 4 : 5; /* in a plane lights have no falloff */
     memcpy(keys, common, count * sizeof *keys);
     for (size_t i = 0; i < vshi_light_member_count && count < MOST_KEYS; ++i) {
         if ((vshi_light_members[i].types & types) != 0) {
@@ -167,7 +165,6 @@ static const vshi_key file_keys[] = {
     VSHI_KEY("file", PATH, AT(path), .required = VSHI_ALL),
     VSHI_KEY("angle_deg", DEGREES, AT(angle), .highest = 180.0, .flags = VSHI_BELOW),
     VSHI_KEY("radius", NUMBER, AT(radius), .highest = VSHI_LARGEST),
-    {.name = "layers", .kind = VSHI_LATER},
 };
 static const vshi_table file_table = VSHI_TABLE(file_keys);
 
@@ -195,17 +192,13 @@ static size_t find_item(const vsh_scene *scene, size_t light) {
     return place;
 }
 
-vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_t light) {
-    return vshi_item(list, find_item(scene, light));
-}
-
 vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene) {
     for (size_t i = 0; i < scene->light_count; ++i) {
         for (size_t k = 0; k < i; ++k) {
             if (strcmp(scene->lights[i].name, scene->lights[k].name) != 0) {
                 continue;
             }
-            const vshi_value of = vshi_light_item(list, scene, i);
+            const vshi_value of = vshi_item(list, find_item(scene, i));
             vshi_value name;
             return scene->light_file_count == 0 && vshi_member(&of, "name", &name)
                        ? vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",

@@ -518,63 +518,8 @@ static vsh_result check_layer(vshi_json *reader, const vshi_value *value, const 
                : vshi_json_fail(reader, value, "\"%.64s\" is none of the scene's layers", name);
 }
 
-/* Whether a layer casts for a light: both may name the other. */
-static bool casts_for(const vsh_scene_layer *layer, const char *name, const vsh_light *light,
-                      const vshi_value *item) {
-    vshi_value names;
-    bool casts = layer->lights == NULL, named = !vshi_member(item, "layers", &names);
-    for (size_t i = 0; !casts && i < layer->light_count; ++i) {
-        casts = strcmp(layer->lights[i], light->name) == 0;
-    }
-    for (size_t i = 0; !named && i < json_array_size(names.json); ++i) {
-        named = strcmp(json_string_value(json_array_get(names.json, i)), name) == 0;
-    }
-    return casts && named;
-}
-
-/* Lists the lights that each layer casts for, if lights name layers. */
-static vsh_result choose_lights(vshi_json *reader, const vshi_value *lights, vsh_scene *scene) {
-    bool choose = false;
-    for (size_t l = 0; l < scene->light_count; ++l) {
-        const vshi_value light = vshi_light_item(lights, scene, l);
-        vshi_value names;
-        if (vshi_member(&light, "layers", &names)) {
-            choose = true;
-            VSHI_TRY(vshi_expect(reader, &names, JSON_ARRAY));
-            for (size_t n = 0; n < json_array_size(names.json); ++n) {
-                const vshi_value name = vshi_item(&names, n);
-                VSHI_TRY(check_layer(reader, &name, scene));
-            }
-        }
-    }
-    if (!choose || scene->layer_count == 0) {
-        return VSH_OK;
-    }
-    vsh_scene_layer *layers;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&layers, scene->layer_count, sizeof *layers, "layers"));
-    memcpy(layers, scene->layers, scene->layer_count * sizeof *layers);
-    for (size_t k = 0; k < scene->layer_count; ++k) {
-        const char **names;
-        size_t count = 0;
-        VSHI_TRY(vshi_json_allocate(reader, (void **)&names, scene->light_count + 1, sizeof *names,
-                                    "lights of a layer"));
-        for (size_t l = 0; l < scene->light_count; ++l) {
-            const vshi_value light = vshi_light_item(lights, scene, l);
-            if (casts_for(&layers[k], layers[k].name, &scene->lights[l], &light)) {
-                names[count++] = scene->lights[l].name;
-            }
-        }
-        if (layers[k].lights != NULL || count < scene->light_count) {
-            layers[k].lights = names;
-            layers[k].light_count = count;
-        }
-    }
-    scene->layers = layers;
-    return VSH_OK;
-}
-
-/* Checks the names that casters, lights and layers have of each other. */
-static vsh_result check_layers(vshi_json *reader, const vshi_value *root, vsh_scene *scene) {
+/* Checks the names of layers, and the names that casters and layers refer to. */
+static vsh_result check_layers(vshi_json *reader, const vshi_value *root, const vsh_scene *scene) {
     vshi_value list, lights, name;
     for (size_t i = 0; i < scene->caster_count && vshi_member(root, "casters", &list); ++i) {
         const vshi_value caster = vshi_item(&list, i);
@@ -598,7 +543,7 @@ static vsh_result check_layers(vshi_json *reader, const vshi_value *root, vsh_sc
             }
         }
     }
-    return vshi_member(root, "lights", &lights) ? choose_lights(reader, &lights, scene) : VSH_OK;
+    return VSH_OK;
 }
 
 /* --- the scene */

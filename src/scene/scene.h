@@ -45,8 +45,6 @@ vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void
 /* Reads the list of lights and its files into a scene whose unit is known. Without the reader's run, lights
  * of files are missing. Fails if two lights have one name. */
 vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene *scene);
-/* The list's item of light `light` of the scene. */
-vshi_value vshi_light_item(const vshi_value *list, const vsh_scene *scene, size_t light);
 /* Fails if two lights of a scene have one name; `list` is their place in the file. */
 vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene);
 

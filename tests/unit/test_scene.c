@@ -308,8 +308,6 @@ static const struct {
     {&layer, "'combine':@'max'", ".combine: \"max\" is none of multiply, min"},
     {&layer, "'lights':[@'sun']", ".lights[0]: \"sun\" is none of the scene's lights"},
     {&layer, "'voxel_size':1,@'resolution':9", ".resolution: cannot stand beside \"voxel_size\""},
-    {&sun, "'layers':[@'b']", ".layers[0]: \"b\" is none of the scene's layers"},
-    {&sun, "'layers':@'b'", ".layers: expected an array, found a string"},
     {&mesh, "'layer':@'b'}],'layers':[{'name':'a'", ".layer: \"b\" is none of the scene's layers"},
     {&whole, "'irradiance':@1", "irradiance: expected true or false, found a number"},
     {&whole, "'irradiance':@null", "irradiance: expected true or false, found null"},
