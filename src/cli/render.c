@@ -80,7 +80,7 @@ static const char *const plane_names[FLOATS] = {"R", "G", "B", "A", "Z", "N.X", 
 
 /* Formats of floats have linear values; all others are for the eye. */
 static bool is_linear(const char *path) {
-    return cli_has_ending(path, "exr hdr rgbe");
+    return cli_has_ending(path, "exr hdr");
 }
 
 static uint64_t count_picture_bytes(const render_settings *s) {

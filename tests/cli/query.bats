@@ -146,22 +146,6 @@ ANSWERS=(--distance --gradient --answers-only)
     [[ $stderr == *voxelize* ]] || fail "no progress"
 }
 
-@test "the points of a PLY mesh without normals take those of its faces" {
-    local head='ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n' faces
-    faces='element face 3\nproperty list uchar int vertex_indices\n'
-    local corners=('-1 0.001 -1' '1 0.001 -1' '1 0.001 1' '-1 0.001 1' '-1 0.5 1')
-    printf "$head${faces}end_header\n%s\n5 5 5\n%s\n%s\n%s\n%s\n3 0 4 3\n3 0 3 2\n3 3 4 5\n" "${corners[@]}" >mesh.ply
-    # the normals by hand: those of the floor are twice 2 along y, the wall's is 0.499 along -z
-    printf '%s\n' '-1,0.001,-1,0,1,0' '1,0.001,-1,0,1,0' '1,0.001,1,0,8,-0.998' '-1,0.001,1,0,4,-0.998' '-1,0.5,1,0,0,-1' >hand.csv
-    succeed "${QUERY[@]}" --method cone --ao 0.6 --points hand.csv --answers-only --format csv -o hand.out
-    succeed "${QUERY[@]}" --method cone --ao 0.6 --points mesh.ply --answers-only --format csv -o mesh.out
-    [[ $stderr == *"row 2: its faces give it no normal"* ]] || fail "no word of the vertex without faces"
-    paste -d, hand.out <(sed 3d mesh.out) |
-        awk -F, 'NR > 1 && (($1 - $3) ^ 2 > 1e-8 || ($2 - $4) ^ 2 > 1e-8) { exit 1 }' || fail "other answers: $(<mesh.out)"
-    refuses 2 mesh.ply normals --ao -- "${QUERY[@]}" --ao 0.6 --points mesh.ply --normals no -o no.ply
-    refuses 2 "need a file" -- "${QUERY[@]}" --ao 0.6 --points - --points-format ply -o no.ply <mesh.ply
-}
-
 @test "bad rows are told by number and answered nan, the rest as without them" {
     cat >good.csv <<'CSV'
 x,y,z,nx,ny,nz

@@ -58,8 +58,7 @@ static void check_row(const cli_points_reader *reader, vshi_table_row *row) {
         zero = zero && (i < NX || (float)value == 0.0f);
     }
     if (zero) {
-        snprintf(row->bad, sizeof row->bad, "%s",
-                 reader->face_normals != NULL ? "its faces give it no normal" : "the normal is zero");
+        snprintf(row->bad, sizeof row->bad, "the normal is zero");
     }
 }
 
@@ -80,75 +79,6 @@ static void add_row(const cli_points_reader *reader, const vshi_table_row *row, 
         points->kept_end[i] = points->kept_size;
     }
     ++points->count;
-}
-
-/* --- normals of faces */
-
-/* Makes each vertex's normal: the sum of its triangles' normals, weighted by area. */
-static float *make_normals(const vsh_mesh *mesh) {
-    const size_t count = mesh->vertex_count;
-    float *normals = malloc(count * 3 * sizeof *normals);
-    double *sums = calloc(count, 3 * sizeof *sums);
-    for (size_t t = 0; t < mesh->triangle_count; ++t) {
-        const uint32_t *corner = mesh->indices + 3 * t;
-        const float *p[3];
-        for (size_t i = 0; i < 3; ++i) {
-            p[i] = mesh->positions + 3 * (size_t)corner[i];
-        }
-        for (size_t i = 0; i < 9; ++i) {
-            const size_t k = i % 3, x = (k + 1) % 3, y = (k + 2) % 3;
-            sums[3 * (size_t)corner[i / 3] + k] +=
-                ((double)p[1][x] - (double)p[0][x]) * ((double)p[2][y] - (double)p[0][y]) -
-                ((double)p[1][y] - (double)p[0][y]) * ((double)p[2][x] - (double)p[0][x]);
-        }
-    }
-    for (size_t v = 0; v < count; ++v) {
-        const double *s = sums + 3 * v, length = sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2]);
-        for (size_t k = 0; k < 3; ++k) {
-            normals[3 * v + k] = length > 0.0 ? (float)(s[k] / length) : 0.0f;
-        }
-    }
-    free(sums);
-    return normals;
-}
-
-static bool has_faces(const vshi_ply_header *ply) {
-    for (int e = 0; e < ply->elements; ++e) {
-        if (ply->element[e].count > 0 &&
-            (strcmp(ply->element[e].name, "face") == 0 || strcmp(ply->element[e].name, "tristrips") == 0)) {
-            return true;
-        }
-    }
-    return false;
-}
-
-void cli_points_read_faces(const char *path, cli_points_reader *reader) {
-    cli_error.message[0] = '\0';
-    if (reader->has_normals || !has_faces(&reader->table.ply)) {
-        return;
-    }
-    if (strcmp(path, "-") == 0) {
-        snprintf(cli_error.message, sizeof cli_error.message, "normals of faces need a file, not a pipe");
-        return;
-    }
-    if (vsh_model_read(path, &cli_run, &reader->model, &cli_error) == VSH_OK) {
-        reader->mesh = vsh_model_mesh(reader->model, 0, -1);
-        reader->face_normals = make_normals(&reader->mesh);
-        reader->has_normals = true;
-    }
-}
-
-/* Gives the row the normal of the next vertex of a face, if that lies there. */
-static void set_normal(cli_points_reader *reader, vshi_table_row *row) {
-    const size_t v = reader->next;
-    bool met = v < reader->mesh.vertex_count;
-    for (size_t k = 0; k < 3; ++k) {
-        met = met && (float)row->value[k] == reader->mesh.positions[3 * v + k];
-    }
-    for (size_t k = 0; k < 3; ++k) {
-        row->value[NX + k] = met ? (double)reader->face_normals[3 * v + k] : 0.0;
-    }
-    reader->next += met;
 }
 
 /* A vsh_progress_fn that only stops the reading. */
@@ -192,9 +122,6 @@ int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *poi
         if (row.bytes == NULL) {
             break;
         }
-        if (row.bad[0] == '\0' && reader->face_normals != NULL) {
-            set_normal(reader, &row);
-        }
         if (row.bad[0] == '\0') {
             check_row(reader, &row);
         }
@@ -215,8 +142,6 @@ bool cli_points_can_keep(const cli_points_reader *reader) {
 
 void cli_points_close(cli_points_reader *reader) {
     vshi_table_close(&reader->table);
-    free(reader->face_normals);
-    vsh_model_free(reader->model);
     vshi_job_end(reader->job);
     *reader = (cli_points_reader){.job = NULL};
 }

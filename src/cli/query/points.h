@@ -28,20 +28,11 @@ typedef struct cli_points_reader {
     bool has_normals, floats; /* floats: positions are floats in the file */
     bool strict;              /* a bad row ends the reading */
     uint64_t bad;             /* bad rows so far */
-    /* a PLY's faces, whose vertices have the order of its rows without those that no face has */
-    vsh_model *model;    /* NULL: normals, if any, are in the rows */
-    vsh_mesh mesh;       /* of the model */
-    float *face_normals; /* [mesh.vertex_count][3] */
-    size_t next;         /* the vertex to expect */
 } cli_points_reader;
 
 /* Opens a file, or standard input for "-", and reads its header. `normals`: 1 requires them, 0 ignores them,
  * -1 reads them if there are any. Close it also after a failure. */
 int cli_points_open(const char *path, int32_t format, int normals, bool strict, cli_points_reader *reader);
-
-/* Gives a PLY's points the normals of its faces, if they have none. cli_error.message says why that failed;
- * "" if there are no faces. */
-void cli_points_read_faces(const char *path, cli_points_reader *reader);
 
 /* Reads up to points->room rows; fewer at the end, or if they have more than `most_kept` bytes. */
 int cli_points_read(cli_points_reader *reader, size_t most_kept, cli_points *points);

@@ -37,9 +37,7 @@ static const cli_option options[] = {
     {"format", "csv|ply|raw", "its format, whatever the ending (for -, as the points)",
      CLI_VALUE(WORD, query_settings, format)},
     {"normals", "no|yes",
-     "whether normals are read (csv and ply: if there are any, a PLY mesh has those of its faces; raw: no, "
-     "rows "
-     "of 3 floats; yes: of 6)",
+     "whether normals are read (csv and ply: if there are any; raw: no, rows of 3 floats; yes: of 6)",
      CLI_VALUE(WORD, query_settings, normals)},
     {"answers-only", NULL,
      "write only answers; else they follow each row as it came, or (formats differ) x y z nx ny nz",
@@ -166,8 +164,7 @@ static int plan_batch(const query_work *work, bool keep, size_t *rows, size_t *m
     const vsh_occluders_info *casters = &work->shading.stats.casters;
     const char *name = work->reader.table.source.name;
     vsh_run run = cli_run;
-    run.memory_held += casters->field_bytes + casters->triangles_bytes +
-                       work->reader.mesh.vertex_count * (uint64_t)sizeof(float[6]);
+    run.memory_held += casters->field_bytes + casters->triangles_bytes;
     const size_t row_size = work->reader.table.row_size; /* 0: text */
     /* twice, because room grows by doubling */
     const size_t own = !keep ? 0 : row_size > 0 ? 2 * row_size : TEXT_BYTES;
@@ -248,13 +245,13 @@ done:
 /* --- the command */
 
 /* Chooses the answers by the scene, the options and the points' normals. */
-static int choose_answers(query_work *work, const char *why) {
+static int choose_answers(query_work *work) {
     const query_settings *s = work->settings;
     query_answers *a = &work->answers;
     vsh_scene *scene = work->shading.scene;
     if (scene->ao && !work->reader.has_normals) {
-        CLI_REFUSE_IF(cli_was_given("ao"), "%s: no normals, which --ao needs%s%s",
-                      work->reader.table.source.name, why[0] != '\0' ? ": " : "", why);
+        CLI_REFUSE_IF(cli_was_given("ao"), "%s: no normals, which --ao needs",
+                      work->reader.table.source.name);
         cli_warn("%s: the points have no normals, so AO is left out", work->reader.table.source.name);
         scene->ao = 0;
     }
@@ -298,11 +295,7 @@ static int run_query(const query_settings *s, query_work *work) {
     CLI_TRY(cli_check_outputs(outputs, CLI_COUNT(outputs), inputs, CLI_COUNT(inputs), shading->scene));
     cli_signals_watch();
     CLI_TRY(cli_points_open(s->points, s->points_format, s->normals, s->strict, &work->reader));
-    cli_error.message[0] = '\0';
-    if (s->normals != 0) {
-        cli_points_read_faces(s->points, &work->reader);
-    }
-    CLI_TRY(choose_answers(work, cli_error.message));
+    CLI_TRY(choose_answers(work));
     CLI_TRY(make_query(work));
     CLI_TRY(answer_points(work));
     CLI_TRY(cli_stats_finish(&shading->stats, s->bake.stats));
