@@ -104,17 +104,10 @@ VSH_API vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_o
 
 /* Errors of values against the truth, over several planes together. Zeros if nothing is compared. */
 typedef struct vsh_accuracy {
-    uint64_t count;       /* values compared: masked in, finite in both */
-    uint64_t penumbra;    /* number of values with a truth of 0.02 … 0.98 */
-    double rmse;          /* of all values */
-    double penumbra_rmse; /* of the penumbra; 0 if there is none */
-    double bias;          /* mean of value - truth */
-    double p95, p99;      /* of |value - truth|, nearest rank */
-    double max;           /* largest |value - truth| */
-    /* Σ |w - v| / Σ v over the penumbrae that the truth has along lines of each axis, from 0.1 to 0.9. v is
-     * the length of the truth between these values, and w that of the values at the same place. A penumbra
-     * without a counterpart counts as 1. NaN if there are no penumbrae. */
-    double width_error;
+    uint64_t count; /* values compared: masked in, finite in both */
+    double rmse;
+    double p99; /* of |value - truth|, nearest rank */
+    double max; /* largest |value - truth| */
 } vsh_accuracy;
 
 /* Measures how far planes of values, 0 … 1, are from their truth, which is `golden`. Takes a byte a value

@@ -556,9 +556,8 @@ static void write_plot(FILE *out, const trade_work *work, const trade_subject *s
 
 /* Writes the CSV of all runs; bench/README.md explains the columns. */
 static void write_runs(FILE *out, const trade_work *work) {
-    fputs("subject,method,options,resolution,build_s,bake_s,us_per_value,bytes,covered,texels,rmse,penumbra_"
-          "rmse,"
-          "bias,p95,p99,max,width_error,front\n",
+    fputs("subject,method,options,resolution,build_s,bake_s,us_per_value,bytes,covered,texels,rmse,p99,max,"
+          "front\n",
           out);
     for (size_t s = 0; s < work->subject_count; ++s) {
         const trade_subject *subject = &work->subjects[s];
@@ -568,10 +567,7 @@ static void write_runs(FILE *out, const trade_work *work) {
             fprintf(out, "%s,%s,%s,%d,%.4g,%.4g,%.4g,%" PRIu64 ",%zu,%zu,", subject->ao ? "ao" : "shadow",
                     run->method, run->options, run->resolution, run->build_s, run->bake_s, run->rate,
                     run->bytes, work->covered, work->points);
-            fprintf(out, "%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,", e->rmse, e->penumbra_rmse, e->bias, e->p95, e->p99,
-                    e->max);
-            fprintf(out, isnan(e->width_error) ? "," : "%.6f,", e->width_error);
-            fprintf(out, "%d\n", run->front);
+            fprintf(out, "%.6f,%.6f,%.6f,%d\n", e->rmse, e->p99, e->max, run->front);
         }
     }
 }
@@ -643,14 +639,11 @@ static void write_page(FILE *out, const trade_work *work) {
     }
     fputs("<h2>All runs</h2>\n<pre>", out);
     write_runs(out, work);
-    fprintf(out,
-            "</pre>\n<p>Penumbrae are texels with a truth of 0.02 … 0.98. The width error is how far the "
-            "distances "
-            "from 10 %% to 90 %% are off, relative to them. The dashed line, and 1 under <code>front</code>, "
-            "is the "
-            "Pareto front: no other run is both faster and nearer to the truth. Made by vdbshade "
-            "%s.</p>\n</html>\n",
-            vsh_version());
+    fprintf(
+        out,
+        "</pre>\n<p>The dashed line, and 1 under <code>front</code>, is the Pareto front: no other run is "
+        "both faster and nearer to the truth. Made by vdbshade %s.</p>\n</html>\n",
+        vsh_version());
 }
 
 /* --- the command */

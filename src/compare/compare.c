@@ -116,7 +116,7 @@ static uint32_t find_bin(const uint64_t *bins, uint64_t *rank) {
 /* Sums over the differences of one or several pairs. */
 typedef struct tally {
     uint64_t count;
-    double sum, squares, worst;
+    double squares, worst;
     size_t worst_at; /* index within its pair */
     uint64_t *bins;  /* [BINS] by upper halves, then [BINS] of scratch for find_percentile() */
 } tally;
@@ -128,7 +128,6 @@ static void add_differences(const vshi_pair *pair, tally *t) {
         }
         const double difference = vshi_difference_at(pair, i);
         ++t->count;
-        t->sum += difference;
         t->squares += difference * difference;
         ++t->bins[bits_of(difference) >> 16];
         if (fabs(difference) > t->worst) {
@@ -172,35 +171,15 @@ static vsh_result measure_values(const vshi_pair *pair, vsh_measures *m, vsh_err
 
 /* --- against a truth */
 
-static const double DARK = 0.02, LIGHT = 0.98; /* values between are penumbra */
-
-static void add_penumbra(const vshi_pair *pair, double *squares, uint64_t *count) {
-    for (size_t i = 0; i < pair->count; ++i) {
-        const double truth = vshi_value_at(pair, VSHI_GOLDEN, i);
-        if (pair->mask[i] && truth >= DARK && truth <= LIGHT) {
-            const double difference = vshi_difference_at(pair, i);
-            *squares += difference * difference;
-            ++*count;
-        }
-    }
-}
-
 static void measure_accuracy(const vshi_pair *pairs, size_t pair_count, tally *t, vsh_accuracy *a) {
-    double squares = 0.0, width = 0.0, off = 0.0;
     for (size_t k = 0; k < pair_count; ++k) {
         add_differences(&pairs[k], t);
-        add_penumbra(&pairs[k], &squares, &a->penumbra);
-        vshi_add_widths(&pairs[k], &width, &off);
     }
     a->count = t->count;
-    a->width_error = width > 0.0 ? off / width : NAN;
     if (t->count > 0) {
         a->rmse = sqrt(t->squares / (double)t->count);
-        a->bias = t->sum / (double)t->count;
-        a->p95 = find_percentile(pairs, pair_count, t, 0.95);
         a->p99 = find_percentile(pairs, pair_count, t, 0.99);
         a->max = t->worst;
-        a->penumbra_rmse = a->penumbra > 0 ? sqrt(squares / (double)a->penumbra) : 0.0;
     }
 }
 

@@ -93,6 +93,3 @@ void vshi_measure_shift(const vshi_pair *pair, void *scratch, vsh_measures *meas
 /* Fills the measures of penumbrae. `noise` is that which the limits allow for. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double noise, vsh_measures *measures,
                                   vsh_error *error);
-
-/* Adds up golden's penumbra widths and the new values' deviation from them, for vsh_accuracy.width_error. */
-void vshi_add_widths(const vshi_pair *pair, double *golden, double *off);

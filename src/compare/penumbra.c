@@ -256,39 +256,3 @@ vsh_result vshi_measure_penumbrae(const vshi_pair *pair, double noise, vsh_measu
     }
     return VSH_OK;
 }
-
-/* --- widths over golden's penumbrae, whatever the new values are there */
-
-/* Length between the sides, from `begin` to `end`. */
-static double length_of(const line *l, int which, size_t begin, size_t end) {
-    double length = 0.0;
-    for (size_t i = begin; i < end; ++i) {
-        length += length_between(l->sides, value_at(l, which, i), value_at(l, which, i + 1));
-    }
-    return length;
-}
-
-/* Adds golden's penumbra between two texels on different sides. The new one may be wider, so the window
- * reaches as far again to both ends. */
-static void add_width(const line *l, size_t begin, size_t end, double *golden, double *off) {
-    for (size_t reach = end - begin + 1, k = 0; k < reach; ++k) {
-        begin -= begin > 0 && is_valid(l, begin - 1);
-        end += end + 1 < l->count && is_valid(l, end + 1);
-    }
-    const double width = length_of(l, VSHI_GOLDEN, begin, end);
-    *golden += width;
-    *off += fabs(length_of(l, VSHI_NEW, begin, end) - width);
-}
-
-void vshi_add_widths(const vshi_pair *pair, double *golden, double *off) {
-    line l = {.pair = pair, .sides = {LOW, HIGH}};
-    for (int axis = 0; axis < 3; ++axis) {
-        set_axis(&l, axis);
-        for (size_t i = 0; i < pair->count; ++i) {
-            size_t crossing[2] = {0, 0};
-            while (begins_line(&l, i) && find_crossing(&l, VSHI_GOLDEN, crossing)) {
-                add_width(&l, crossing[0], crossing[1], golden, off);
-            }
-        }
-    }
-}

@@ -500,12 +500,8 @@ TEST(accuracy_is_the_measure_of_the_tests) {
     vsh_accuracy a;
     assert_ok(vsh_compare_accuracy(planes, PLANES, NULL, &a, &failure));
     const truth_metrics expected = truth_compare(ALL, values, truth, masked);
-    assert_true(a.count == expected.count && a.penumbra == expected.penumbra);
-    assert_true(a.penumbra > 0 && a.penumbra < a.count);
+    assert_true(a.count == expected.count);
     assert_near(a.rmse, expected.rmse, 1e-12);
-    assert_near(a.penumbra_rmse, expected.penumbra_rmse, 1e-12);
-    assert_near(a.bias, expected.bias, 1e-12);
-    assert_near(a.p95, expected.p95, 1e-7);
     assert_near(a.p99, expected.p99, 1e-7);
     assert_near(a.max, expected.max, 1e-12);
     const vsh_run tight = run_within(10 * ALL - 1);
@@ -514,24 +510,7 @@ TEST(accuracy_is_the_measure_of_the_tests) {
     assert_ok(vsh_compare_accuracy(planes, 1, NULL, &a, &failure));
     assert_int_equal(a.count, COUNT - (COUNT + 6) / 7 - 1);
     assert_ok(vsh_compare_accuracy(planes, 0, NULL, &a, &failure));
-    assert_true(a.count == 0 && a.rmse == 0.0 && isnan(a.width_error));
-}
-
-/* A penumbra of 30 texels from 0 to 1: 24 of them between 0.1 and 0.9. */
-TEST(a_penumbra_that_is_gone_is_off_by_all_of_its_width) {
-    const ramp r = {30.0, 0.0, 0.0};
-    const double lit = 1.0, factors[] = {1.0, 0.5, 1.2, 0.0 /* gone */};
-    FREED_BY(free_plane) plane truth = make_plane(SIDE, SIDE, 1, ramp_at, &r);
-    for (size_t i = 0; i < COUNT_OF(factors); ++i) {
-        const ramp other = {30.0 * factors[i], 0.0, 0.0};
-        FREED_BY(free_plane)
-        plane values = factors[i] > 0.0 ? make_plane(SIDE, SIDE, 1, ramp_at, &other)
-                                        : make_plane(SIDE, SIDE, 1, flat, &lit);
-        const vsh_compared compared = pair_of(&truth, &values, NULL);
-        vsh_accuracy a;
-        assert_ok(vsh_compare_accuracy(&compared, 1, NULL, &a, &failure));
-        assert_near(a.width_error, fabs(factors[i] - 1.0), 1e-4);
-    }
+    assert_true(a.count == 0 && a.rmse == 0.0);
 }
 
 /* --- lost shadows: a bar, `wide` texels from x = 30 on, 20 long from y = 40 on */
