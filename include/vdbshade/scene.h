@@ -489,7 +489,7 @@ typedef struct vsh_bake_options {
     size_t struct_size;
     const char *scratch; /* folder for nameless files beyond run->memory_limit; NULL: the output's folder */
     const char *invalid_picture; /* PNG of the invalid texels, one for each lightmap; several are
-                                    FILE.OUTPUT.png. NULL: none */
+                                    FILE.N.OUTPUT.png, N from 0. NULL: none */
     /* receives the lightmaps instead of files. NULL: write the receivers' outputs, with their provenance;
      * outputs that end in .glb, .gltf or .obj are assets with their light */
     vsh_rows_fn *rows;

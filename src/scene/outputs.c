@@ -533,45 +533,19 @@ static vsh_result keep_lit_page(const vshi_scene_page *page, vsh_error *error) {
 
 /* --- a picture of a lightmap's charts and their invalid texels */
 
-/* Whether the lightmap's output is NAME with any ending. Some file systems ignore case. */
-static bool has_stem(const vshi_target *target, const char *name) {
-    const char *own = find_name(target->output != NULL ? target->output : ""), *dot = strrchr(own, '.');
-    const size_t length = dot != NULL ? (size_t)(dot - own) : strlen(own);
-    return strlen(name) == length && strncasecmp(own, name, length) == 0;
-}
-
-static bool is_taken(const vshi_scene_bake *bake, const char *name) {
-    bool taken = false;
-    for (size_t i = 0; i < bake->target_count && !taken; ++i) {
-        taken = has_stem(&bake->targets[i], name);
-    }
-    return taken;
-}
-
-/* FILE.png for one lightmap, else "where.floor.png" for the first "floor", "where.floor-2.png" for the
- * second, without numbers that are another output's. To be freed; NULL if out of memory. */
+/* FILE.png for one lightmap, else FILE.N.OUTPUT.png: "where.0.floor.png". To be freed; NULL if out of memory.
+ */
 static char *name_picture(const vshi_scene_bake *bake, const vshi_target *target, const char *file) {
     if (bake->target_count == 1) {
         return strdup(file);
     }
-    const char *output = find_name(target->output != NULL ? target->output : "");
-    const char *dot = strrchr(output, '.');
-    char *stem = dot != NULL ? strndup(output, (size_t)(dot - output)) : strdup(output);
-    char *name = stem != NULL ? strdup(stem) : NULL, *path = NULL;
-    size_t number = 1;
-    for (const vshi_target *other = bake->targets; other < target && name != NULL; ++other) {
-        for (bool again = has_stem(other, stem); again && name != NULL; again = is_taken(bake, name)) {
-            free(name);
-            name = asprintf(&name, "%s-%zu", stem, ++number) >= 0 ? name : NULL;
-        }
-    }
+    const char *output = find_name(target->output != NULL ? target->output : ""), *dot = strrchr(output, '.');
+    const int stem = dot != NULL ? (int)(dot - output) : (int)strlen(output);
     const int before = (int)(strlen(file) - strlen(".png"));
-    if (name != NULL && asprintf(&path, "%.*s.%s.png", before, file, name) < 0) {
-        path = NULL;
-    }
-    free(name);
-    free(stem);
-    return path;
+    char *path;
+    return asprintf(&path, "%.*s.%td.%.*s.png", before, file, target - bake->targets, stem, output) >= 0
+               ? path
+               : NULL;
 }
 
 /* Writes the picture of a page, if the caller wants one. */

@@ -184,9 +184,9 @@ LIST
     same images.second.exr all.second.exr
     # and what is invalid has a picture for each, of pages too
     succeed bake fit.json "${rest[@]}" --ao 1 -o lit.glb --invalid where.png
-    [ "$(echo where*)" = "where.lit.box.png where.lit.second.png" ] || fail "$(ls)"
+    [ "$(echo where*)" = "where.0.lit.box.png where.1.lit.second.png" ] || fail "$(ls)"
     succeed bake uneven.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
-    [ "$(echo page*)" = "page.lit.0.png page.lit.1.png" ] || fail "$(ls)"
+    [ "$(echo page*)" = "page.0.lit.0.png page.1.lit.1.png" ] || fail "$(ls)"
 }
 
 @test "objects whose UVs each fill the square are lit as they are, with a lightmap for each" {

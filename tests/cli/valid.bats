@@ -50,18 +50,15 @@ prepare() {
 }
 
 @test "pictures of outputs of one name in several folders have names of their own" {
-    mkdir a b c d
+    mkdir a b
     local output outputs=()
-    for output in a/wall.exr b/wall.exr c/wall-2.exr d/Wall.exr; do
+    for output in a/wall.exr b/wall.exr; do
         outputs+=("{\"mesh\": \"box.obj\", \"size\": $((32 + 8 * ${#outputs[@]})), \"output\": \"$output\"}")
     done
     (IFS=, && echo "{\"casters\": [{\"mesh\": \"box.obj\"}], \"ao\": {\"distance\": 1}, \"receivers\": [${outputs[*]}]}") >walls.json
     succeed bake walls.json --invalid where.png
-    [ "$(ls where* | wc -l)" -eq 4 ] || fail "$(ls)"
-    local name
-    for name in wall:32 wall-3:40 wall-2:48 Wall-4:56; do
-        info_tells "where.${name%:*}.png" "${name#*:} × ${name#*:}"
-    done
+    info_tells where.0.wall.png "32 × 32"
+    info_tells where.1.wall.png "40 × 40"
 }
 
 @test "charts closer than a texel are told of, and from which size on they are apart" {

@@ -71,8 +71,8 @@ static const cli_option options[] = {
     {"exr", "FILE.exr", "also an EXR of all channels beside a .glb or .gltf",
      CLI_VALUE(TEXT, cli_bake_settings, exr)},
     {"invalid", "FILE.png",
-     "also a picture of the lightmap: charts grey, texels inside solids or behind walls red; FILE.OUT.png if "
-     "there are several outputs",
+     "also a picture of the lightmap: charts grey, texels inside solids or behind walls red; "
+     "FILE.N.OUT.png if there are several outputs",
      CLI_VALUE(TEXT, cli_bake_settings, invalid_picture)},
     CLI_STATS_OPTION(cli_bake_settings, stats),
     {"shard", "I/N",
