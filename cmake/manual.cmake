@@ -1,5 +1,4 @@
-# Pages of docs that `vdbshade help TOPIC` prints, as arrays, and man pages, which the built program writes
-# (`vdbshade help --write FOLDER`).
+# Pages of docs that `vdbshade help TOPIC` prints, as arrays, and the man page.
 set(VSH_HELP_PAGES ${PROJECT_BINARY_DIR}/help_pages.c)
 file(GLOB VSH_HELP_TEXTS CONFIGURE_DEPENDS docs/*.md)
 list(FILTER VSH_HELP_TEXTS EXCLUDE REGEX "/(architecture|README).md$") # for developers; an index of links
@@ -11,13 +10,5 @@ add_library(vdbshade_help_pages OBJECT ${VSH_HELP_PAGES}) # for every target mad
 vsh_set_source_flags(vdbshade_help_pages)
 target_include_directories(vdbshade_help_pages PRIVATE src include)
 
-set(VSH_MANUAL ${PROJECT_BINARY_DIR}/manual)
-function(vsh_add_manual program)
-  add_custom_command(OUTPUT ${VSH_MANUAL}/done
-                     COMMAND ${CMAKE_COMMAND} -E rm -rf ${VSH_MANUAL}
-                     COMMAND ${program} help --write ${VSH_MANUAL}
-                     COMMAND ${CMAKE_COMMAND} -E touch ${VSH_MANUAL}/done
-                     DEPENDS ${program} VERBATIM)
-  add_custom_target(manual ALL DEPENDS ${VSH_MANUAL}/done)
-  install(DIRECTORY ${VSH_MANUAL}/share/man/man1 DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT program)
-endfunction()
+configure_file(cmake/vdbshade.1.in vdbshade.1 @ONLY)
+install(FILES ${PROJECT_BINARY_DIR}/vdbshade.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT program)

@@ -24,6 +24,6 @@ has() { # COMPONENT FILE …
 }
 has library '*/libvdbshade.so.*' '*/vdbshade/libvdbshade_openvdb.so.*' '*/vdbshade/libvdbshade_oiio.so.*' '*/vdbshade/libvdbshade_importers.so.*' 'libexec/vdbshade/vdbshade-reader'
 has development '*/libvdbshade.so' '*/libvdbshade.a' include/vdbshade/vdbshade.h '*/vdbshade.pc' '*/vdbshade-config.cmake'
-has program bin/vdbshade share/man/man1/vdbshade.1 share/man/man1/vdbshade-bake.1
+has program bin/vdbshade share/man/man1/vdbshade.1
 has documentation share/doc/vdbshade/docs/scene.md share/doc/vdbshade/examples/points.c
 echo "components: $(wc -l <"$work/whole.txt") files, each in one"

@@ -1,9 +1,7 @@
-/* vdbshade: the table of commands, their help and man pages, the command `help`, and main(). */
+/* vdbshade: the table of commands, their help, the command `help`, and main(). */
 #include "cli.h"
 
-#include <ctype.h>
 #include <errno.h>
-#include <limits.h>
 #include <strings.h>
 #include <sys/prctl.h>
 #include <sys/syscall.h>
@@ -41,15 +39,11 @@ static const cli_command *find_command(const char *name) {
 
 /* --- running text, broken into lines at blanks */
 
-typedef void put_word_fn(FILE *out, const char *word, int length, bool first);
-
 typedef struct text {
-    FILE *out;
-    int width;        /* characters of a line, if words are not longer */
-    int lead;         /* blanks before the first line */
-    int indent;       /* blanks before each later line */
-    put_word_fn *put; /* NULL: words stay as they are; `first` begins a line */
-    int column;       /* 0 to begin with */
+    int width;  /* characters of a line, if words are not longer */
+    int lead;   /* blanks before the first line */
+    int indent; /* blanks before each later line */
+    int column; /* 0 to begin with */
 } text;
 
 /* Counts the characters of UTF-8 text. */
@@ -67,21 +61,17 @@ static void add_words(text *t, const char *words) {
         const size_t length = strcspn(words, blanks);
         const int wide = count_characters(words, length);
         if (t->column > 0 && t->column + 1 + wide > t->width) {
-            fputc('\n', t->out);
+            putchar('\n');
             t->column = 0;
         }
         const bool first = t->column == 0;
         if (first) {
-            fprintf(t->out, "%*s", t->lead, "");
+            printf("%*s", t->lead, "");
             t->lead = t->indent;
         } else {
-            fputc(' ', t->out);
+            putchar(' ');
         }
-        if (t->put != NULL) {
-            t->put(t->out, words, (int)length, first);
-        } else {
-            fwrite(words, 1, length, t->out);
-        }
+        fwrite(words, 1, length, stdout);
         t->column += wide + !first;
         words += length;
     }
@@ -90,7 +80,7 @@ static void add_words(text *t, const char *words) {
 /* Writes words as lines. */
 static void write_text(text t, const char *words) {
     add_words(&t, words);
-    fputc('\n', t.out);
+    putchar('\n');
 }
 
 /* --- help on standard output */
@@ -111,7 +101,7 @@ static void print_option(const cli_option *option) {
         putchar('\n');
         columns = 0;
     }
-    const text t = {.out = stdout, .width = HELP_WIDTH, .lead = HELP_COLUMN - columns, .indent = HELP_COLUMN};
+    const text t = {.width = HELP_WIDTH, .lead = HELP_COLUMN - columns, .indent = HELP_COLUMN};
     write_text(t, option->help);
 }
 
@@ -137,7 +127,7 @@ static void print_commands(void) {
            "  vdbshade COMMAND --help   options of a command\n"
            "  vdbshade help             pages of the manual too\n"
            "  vdbshade --version        version\n\n");
-    text t = {.out = stdout, .width = PAGE_WIDTH};
+    text t = {.width = PAGE_WIDTH};
     add_words(&t, "Exit codes:");
     for (size_t i = 0; i < CLI_COUNT(exits); ++i) {
         char line[96];
@@ -148,149 +138,9 @@ static void print_commands(void) {
     write_text(t, errors);
 }
 
-/* --- man pages in the man macros, man(7), without a date: the same build gives the same page */
-
-enum { MAN_WIDTH = 56 }; /* bytes; escapes make lines up to 80 long */
-
-/* Writes a word literally. Dashes are minus signs, which can be copied. */
-static void put_literally(FILE *out, const char *word, int length, bool first) {
-    if (first && (word[0] == '.' || word[0] == '\'')) {
-        fputs("\\&", out);
-    }
-    for (int i = 0; i < length; ++i) {
-        if (word[i] == '\\' || word[i] == '-') {
-            fputs(word[i] == '-' ? "\\-" : "\\e", out);
-        } else {
-            fputc(word[i], out);
-        }
-    }
-}
-
-static void write_paragraph(FILE *out, const char *words) {
-    write_text((text){.out = out, .width = MAN_WIDTH, .put = put_literally}, words);
-}
-
-static void put_in_font(FILE *out, char font, const char *word, int length) {
-    fprintf(out, "\\f%c", font);
-    put_literally(out, word, length, false);
-    fputs("\\fR", out);
-}
-
-/* Options are bold, placeholders in italics. */
-static void put_usage(FILE *out, const char *word, int length, bool first) {
-    (void)first;
-    put_in_font(out, word[0] == '-' ? 'B' : 'I', word, length);
-}
-
-/* Writes " INPUT -o OUT [options]". */
-static void write_usage(FILE *out, const char *usage) {
-    write_text((text){.out = out, .width = INT_MAX, .lead = 1, .put = put_usage}, usage);
-}
-
-static void write_title(FILE *out, const char *name) {
-    fprintf(out, ".\\\" Made by 'vdbshade help --man'.\n.TH ");
-    for (const char *c = name; *c != '\0'; ++c) {
-        fputc(toupper((unsigned char)*c), out);
-    }
-    fprintf(out, " 1 \"\" \"vdbshade %s\" \"vdbshade\"\n", vsh_version());
-}
-
-static void write_option(FILE *out, const cli_option *option) {
-    fputs(".TP\n", out);
-    if (cli_letter_of(option->name) != '\0') {
-        fprintf(out, "\\fB\\-%c\\fR, ", cli_letter_of(option->name));
-    }
-    char name[72];
-    snprintf(name, sizeof name, "--%s", option->name);
-    put_in_font(out, 'B', name, (int)strlen(name));
-    if (option->value != NULL) {
-        fputc(' ', out);
-        put_in_font(out, 'I', option->value, (int)strlen(option->value));
-    }
-    fputc('\n', out);
-    write_paragraph(out, option->help);
-}
-
-/* Writes the exit codes, and the names of all other pages. */
-static void write_end(FILE *out, const cli_command *command) {
-    fputs(".SH EXIT STATUS\n", out);
-    for (size_t i = 0; i < CLI_COUNT(exits); ++i) {
-        fprintf(out, ".TP\n\\fB%d\\fR\n", exits[i].code);
-        write_paragraph(out, exits[i].meaning);
-    }
-    fputs(".PP\n", out);
-    write_paragraph(out, errors);
-    fputs(command != NULL ? ".SH SEE ALSO\n.BR vdbshade (1)" : ".SH SEE ALSO", out);
-    size_t listed = command != NULL;
-    for (size_t i = 0; commands[i] != NULL; ++i) {
-        if (commands[i] != command) {
-            fprintf(out, "%s\n.BR vdbshade\\-%s (1)", listed++ > 0 ? "," : "", commands[i]->name);
-        }
-    }
-    fputs("\n.PP\n", out);
-    write_paragraph(out, "'vdbshade help' lists the pages of the manual.");
-}
-
-static void write_program_page(FILE *out) {
-    write_title(out, "vdbshade");
-    fputs(".SH NAME\nvdbshade \\- soft shadows and ambient occlusion from signed distance fields\n"
-          ".SH SYNOPSIS\n\\fBvdbshade\\fR \\fICOMMAND\\fR ...\n.br\n"
-          "\\fBvdbshade\\fR \\fICOMMAND\\fR \\fB\\-\\-help\\fR\n.br\n\\fBvdbshade \\-\\-version\\fR\n.SH "
-          "DESCRIPTION\n",
-          out);
-    write_paragraph(out, summary);
-    fputs(".SH COMMANDS\n", out);
-    for (size_t i = 0; commands[i] != NULL; ++i) {
-        fprintf(out, ".TP\n\\fB%s\\fR", commands[i]->name);
-        write_usage(out, commands[i]->usage);
-        write_paragraph(out, commands[i]->brief);
-    }
-    write_end(out, NULL);
-}
-
-/* Writes the man page of a command, or (NULL) of the program. */
-static void write_man(FILE *out, const cli_command *command) {
-    if (command == NULL) {
-        write_program_page(out);
-        return;
-    }
-    char name[64];
-    snprintf(name, sizeof name, "vdbshade-%s", command->name);
-    write_title(out, name);
-    fprintf(out, ".SH NAME\nvdbshade\\-%s \\-\n", command->name);
-    write_paragraph(out, command->brief);
-    fprintf(out, ".SH SYNOPSIS\n\\fBvdbshade %s\\fR", command->name);
-    write_usage(out, command->usage);
-    fputs(".SH DESCRIPTION\n", out);
-    write_paragraph(out, command->summary);
-    fputs(".SH OPTIONS\n", out);
-    cli_option options[CLI_MOST_OPTIONS];
-    const size_t count = cli_list_options(command, options);
-    for (size_t i = 0; i < count; ++i) {
-        if (options[i].kind != CLI_KIND_HEADING) {
-            write_option(out, &options[i]);
-        } else {
-            fputs(".SS ", out);
-            write_paragraph(out, options[i].help);
-        }
-    }
-    write_end(out, command);
-}
-
 /* --- the command `help` */
 
-typedef struct help_settings {
-    const char *folder;
-    bool man;
-} help_settings;
-
-static const cli_option options[] = {
-    {.help = "Options"},
-    {"man", NULL, "print the man page of the command, or of vdbshade", CLI_VALUE(FLAG, help_settings, man)},
-    {"write", "FOLDER", "write all man pages there, as packages install them",
-     CLI_VALUE(TEXT, help_settings, folder)},
-    CLI_HELP_OPTION,
-};
+static const cli_option options[] = {{.help = "Options"}, CLI_HELP_OPTION};
 
 /* Finds "scene", "scene.md" or "docs/scene.md", in any case. */
 static const cli_page *find_page(const char *topic) {
@@ -330,7 +180,7 @@ static const char *find_nearest(const char *topic, bool has_pages) {
     return cli_nearest(topic, names, count);
 }
 
-static int print_topic(const char *topic, bool man) {
+static int print_topic(const char *topic) {
     const cli_command *command = find_command(topic);
     const cli_page *page = find_page(topic);
     if (command == NULL && page == NULL) {
@@ -338,50 +188,24 @@ static int print_topic(const char *topic, bool man) {
         CLI_REFUSE_IF(near != NULL, "help: %s: no such topic; did you mean %s?", topic, near);
         return cli_usage("help: %s: no such topic; 'vdbshade help' lists them", topic);
     }
-    if (command != NULL && man) {
-        write_man(stdout, command);
-    } else if (command != NULL) {
+    if (command != NULL) {
         cli_print_help(command);
         if (page != NULL) {
             printf("\nThe manual's page: vdbshade help docs/%s.md\n", topic);
         }
-    } else if (man) {
-        return cli_usage("--man: %s is no command", topic);
     } else {
         fwrite(page->bytes, 1, page->size, stdout);
     }
     return CLI_OK;
 }
 
-/* Writes the man page of a command, or (NULL) of the program, to a file. */
-static int write_page(const char *folder, const cli_command *command) {
-    const char *path = cli_keep_text("%s/share/man/man1/vdbshade%s%s.1", folder, command != NULL ? "-" : "",
-                                     command != NULL ? command->name : "");
-    CLI_TRY(cli_make_folder_of(path));
-    cli_temporary page;
-    CLI_TRY(cli_temporary_begin(&page, path));
-    write_man(page.file, command);
-    return cli_temporary_commit(&page);
-}
-
 static int help_main(int argc, char **argv) {
-    help_settings s = {.folder = NULL};
     const char *topic;
-    CLI_TRY(cli_parse(&cli_help, argc, argv, &s, &topic));
-    CLI_REFUSE_IF(s.folder != NULL && (topic != NULL || s.man),
-                  "help: --write goes alone, not with TOPIC or --man");
-    if (s.folder != NULL) {
-        CLI_TRY(write_page(s.folder, NULL));
-        for (size_t i = 0; commands[i] != NULL; ++i) {
-            CLI_TRY(write_page(s.folder, commands[i]));
-        }
-    } else if (topic != NULL) {
-        return print_topic(topic, s.man);
-    } else if (s.man) {
-        write_man(stdout, NULL);
-    } else {
-        list_topics();
+    CLI_TRY(cli_parse(&cli_help, argc, argv, NULL, &topic));
+    if (topic != NULL) {
+        return print_topic(topic);
     }
+    list_topics();
     return CLI_OK;
 }
 

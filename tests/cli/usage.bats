@@ -1,4 +1,4 @@
-# Help, version, man pages, and what is wrong with a command line; the documents of formats and settings say the same.
+# Help, version, and what is wrong with a command line; the documents of formats and settings say the same.
 load helper
 
 commands() {
@@ -181,11 +181,6 @@ tables() {
     [[ $(help_of size) == *"each from 1 to 65536 texels (512)"* ]] || fail "$(help_of size)"
 }
 
-# The options that --help of command $1 names, one a line.
-options_of() {
-    "$VDBSHADE" "$1" --help | grep -oE '^ {2,6}(-., )?--[a-z0-9-]+' | grep -oE -- '--[a-z0-9-]+' | sort
-}
-
 @test "help prints what --help of a command prints, and pages of the manual" {
     for command in $(commands); do
         "$VDBSHADE" "$command" --help >expected.txt
@@ -205,36 +200,12 @@ options_of() {
     [[ $output == *"docs/query "* && $output == *"  scene "* ]] || fail "a command's name hides its page"
 }
 
-@test "an unknown topic suggests the nearest, and what does not go together is refused" {
+@test "an unknown topic suggests the nearest" {
     refuse_each help <<'LIST'
 2 seen 'did you mean scene?' | seen
 2 'did you mean bake?' | bakke
 2 'vdbshade help' | zzzzzzzzz
-2 TOPIC | bake --write pages
-2 scene | --man scene
 LIST
-}
-
-@test "there is a man page for the program and each command, with every option of its help" {
-    "$VDBSHADE" help --write pages
-    [ "$(ls pages/share/man/man1 | wc -l)" -eq $(($(commands | wc -l) + 1)) ]
-    for command in $(commands); do
-        page=pages/share/man/man1/vdbshade-$command.1
-        "$VDBSHADE" help --man "$command" | cmp - "$page"
-        man --warnings -l "$page" 2>&1 >plain.txt | tee troff.txt
-        [ ! -s troff.txt ] || fail "$page"
-        MANWIDTH=120 man -l "$page" | col -b >plain.txt
-        grep -oE '^ {7}(-., )?--[a-z0-9-]+' plain.txt | grep -oE -- '--[a-z0-9-]+' | sort >there.txt
-        options_of "$command" | diff - there.txt
-        grep -q "vdbshade-$command - " plain.txt
-        grep -qE '^ +vdbshade '"$command"' ' plain.txt
-        grep -qE '^ +130 +interrupted' plain.txt
-    done
-    "$VDBSHADE" help --man | cmp - pages/share/man/man1/vdbshade.1
-    # texts are there whole, whatever is in them
-    MANWIDTH=1000 man -l pages/share/man/man1/vdbshade-bake.1 | col -b >plain.txt
-    grep -qF -- "radius of points and spots of --lights, scene units (0: hard)" plain.txt
-    grep -qF -- "R=NAME,…" plain.txt
 }
 
 # endings_after TEXT: the endings in the first column of the table whose head holds the text.
