@@ -14,9 +14,8 @@
  * and its square is far from underflow. */
 #define VSHI_LEAST_SINE 0x1p-20
 
-/* The largest sine of a half angle, with its tangent and angle. At 1 the cone would be a half space. */
+/* The largest sine of a half angle, with its angle. At 1 the cone would be a half space. */
 #define VSHI_LARGEST_SINE (1.0 - 1e-9)
-#define VSHI_LARGEST_TANGENT 22360.68
 #define VSHI_LARGEST_HALF (0.5 * 3.14159265358979323846 - 4.4721359e-5)
 
 static inline double vshi_light_sine(double sine) {

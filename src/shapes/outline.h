@@ -1,8 +1,8 @@
 /* An outline: closed contours, and a tree over pieces of them.
  *
  * A leaf, and every node up to a whole contour, holds successive segments of one contour: a chain. A chain's
- * two ends alone give its winding around a point outside its box, and the directions that it hides from
- * there. Above the contours the tree halves space. */
+ * two ends alone give its winding around a point outside its box. Above the contours the tree halves space.
+ */
 #pragma once
 
 #include "base/job.h"
