@@ -218,11 +218,9 @@ static inline vsh_flat_options vsh_flat_options_default(void) {
 
 /* Casters of a flat scene, and the members that they take. */
 typedef enum vsh_flat_type {
-    VSH_FLAT_MASK = 0,   /* path, mask */
-    VSH_FLAT_TEXT = 1,   /* path (the font), text, letters */
-    VSH_FLAT_CIRCLE = 2, /* radius; a polygon of 256 sides and equal area */
-    VSH_FLAT_BOX = 3,    /* half_size */
-    VSH_FLAT_POLYGON = 4 /* points */
+    VSH_FLAT_MASK = 0, /* path, mask */
+    VSH_FLAT_TEXT = 1, /* path (the font), text, letters */
+    VSH_FLAT_BOX = 2   /* half_size */
 } vsh_flat_type;
 
 /* A caster of a flat scene. Members apply to the types that name them. */
@@ -232,10 +230,7 @@ typedef struct vsh_flat_caster {
     vsh_mask_options mask;    /* how the image becomes an outline */
     const char *text;         /* UTF-8 */
     vsh_text_options letters; /* how text becomes an outline */
-    double radius;            /* world units, > 0 */
-    double half_size[2];      /* the same */
-    const double *points;     /* [point_count][2], a closed polygon of either direction, may cross itself */
-    size_t point_count;       /* ≥ 3 */
+    double half_size[2];      /* world units, > 0 */
     double transform[6];      /* local to world, two rows of three (column 2 translates); may mirror and scale
                                  unevenly, but not flatten */
 } vsh_flat_caster;
@@ -287,7 +282,7 @@ typedef struct vsh_flat_map {
  * sees all of it. Errors (the planes then hold nothing of use):
  * - VSH_ERROR_ARGUMENT: scene or map NULL; options out of range; a light that vsh_light_check() refuses or
  *   whose direction has no length in the plane (the message gives its number); a caster of no type; run;
- * - VSH_ERROR_INPUT, VSH_ERROR_READ, VSH_ERROR_UNSUPPORTED: a caster's image, font, text or polygon;
+ * - VSH_ERROR_INPUT, VSH_ERROR_READ, VSH_ERROR_UNSUPPORTED: a caster's image, font or text;
  * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^31 distances in the grid;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_flat_bake(const vsh_flat_scene *scene, const vsh_run *run, const vsh_flat_map *map,

@@ -212,7 +212,7 @@ static void state_caster(json_t *casters, const vsh_caster *caster, size_t index
 
 /* Returns false if the file is no flat scene. */
 static bool state_flat(json_t *root, const char *path) {
-    static const char *const types[] = {"mask", "text", "circle", "box", "polygon"};
+    static const char *const types[] = {"mask", "text", "box"};
     vsh_flat_scene *scene = NULL;
     if (vsh_flat_scene_read(path, &cli_run, &scene, NULL) != VSH_OK) {
         return false;

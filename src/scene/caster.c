@@ -397,21 +397,6 @@ vsh_result vshi_read_type(vshi_json *reader, const vshi_value *object, const cha
     return VSH_OK;
 }
 
-/* The arrays of numbers in an array, each of so many. */
-static vsh_result read_rows(vshi_json *reader, const vshi_value *array, int32_t columns, const char *what,
-                            const double **rows) {
-    const vshi_key key = {.kind = VSHI_VECTOR, .count = columns, VSHI_ANY};
-    const size_t count = json_array_size(array->json), width = (size_t)columns;
-    double *read;
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&read, count, width * sizeof *read, what));
-    for (size_t i = 0; i < count; ++i) {
-        const vshi_value item = vshi_item(array, i);
-        VSHI_TRY(vshi_read_value(reader, &item, &key, read + width * i));
-    }
-    *rows = read;
-    return VSH_OK;
-}
-
 /* A file's name, or [[x, y, z, radius], …]. */
 static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void *member) {
     static const vshi_key path = {.kind = VSHI_PATH};
@@ -426,10 +411,16 @@ static vsh_result read_spheres(vshi_json *reader, const vshi_value *value, void 
     if (caster->sphere_count == 0) {
         return vshi_json_fail(reader, value, "is empty");
     }
-    VSHI_TRY(read_rows(reader, value, 4, "spheres", &caster->spheres));
+    static const vshi_key row = {.kind = VSHI_VECTOR, .count = 4, VSHI_ANY};
+    double *spheres;
+    VSHI_TRY(
+        vshi_json_allocate(reader, (void **)&spheres, caster->sphere_count, 4 * sizeof *spheres, "spheres"));
+    caster->spheres = spheres;
     for (size_t i = 0; i < caster->sphere_count; ++i) {
-        if (!(caster->spheres[4 * i + 3] > 0.0)) {
-            const vshi_value item = vshi_item(value, i), radius = vshi_item(&item, 3);
+        const vshi_value item = vshi_item(value, i);
+        VSHI_TRY(vshi_read_value(reader, &item, &row, spheres + 4 * i));
+        if (!(spheres[4 * i + 3] > 0.0)) {
+            const vshi_value radius = vshi_item(&item, 3);
             return vshi_json_fail(reader, &radius, "%.9g is out of range 0 (excluded) … %.9g",
                                   caster->spheres[4 * i + 3], VSHI_LARGEST);
         }
@@ -523,32 +514,10 @@ vsh_result vshi_read_caster(vshi_json *reader, const vshi_value *value, void *me
 
 /* --- flat casters */
 
-enum {
-    FLAT_MASK = 1 << VSH_FLAT_MASK,
-    FLAT_TEXT = 1 << VSH_FLAT_TEXT,
-    CIRCLE = 1 << VSH_FLAT_CIRCLE,
-    BOX = 1 << VSH_FLAT_BOX,
-    POLYGON = 1 << VSH_FLAT_POLYGON
-};
+enum { FLAT_MASK = 1 << VSH_FLAT_MASK, FLAT_TEXT = 1 << VSH_FLAT_TEXT, BOX = 1 << VSH_FLAT_BOX };
 
-static const size_t MAX_POINTS = (size_t)1 << 20;
-
-/* Names of the shapes, from VSH_FLAT_CIRCLE on. */
 static const char *flat_shape_name(int32_t i) {
-    static const char *const names[] = {"circle", "box", "polygon", NULL};
-    return names[i];
-}
-
-static vsh_result read_points(vshi_json *reader, const vshi_value *value, void *member) {
-    vsh_flat_caster *caster = member;
-    VSHI_TRY(vshi_expect(reader, value, JSON_ARRAY));
-    const size_t count = json_array_size(value->json);
-    if (count < 3 || count > MAX_POINTS) {
-        return vshi_json_fail(reader, value, "has %zu points, out of range 3 … %zu", count, MAX_POINTS);
-    }
-    VSHI_TRY(read_rows(reader, value, 2, "points", &caster->points));
-    caster->point_count = count;
-    return VSH_OK;
+    return i == 0 ? "box" : NULL;
 }
 
 /* A caster, and the numbers that make its transform. */
@@ -562,10 +531,8 @@ typedef struct placed {
 #define AT(member) .offset = offsetof(placed, member)
 static const vshi_key flat_keys[] = {
     VSHI_OUTLINE_KEYS(vsh_flat_caster, FLAT_MASK, FLAT_TEXT),
-    VSHI_KEY("shape", LATER, .variants = CIRCLE | BOX | POLYGON),
-    VSHI_KEY("radius", NUMBER, AT(caster.radius), VSHI_NEEDED_BY(CIRCLE), VSHI_POSITIVE),
+    VSHI_KEY("shape", LATER, .variants = BOX),
     VSHI_KEY("half_size", VECTOR, AT(caster.half_size), VSHI_NEEDED_BY(BOX), .count = 2, VSHI_POSITIVE),
-    VSHI_KEY("points", CUSTOM, VSHI_NEEDED_BY(POLYGON), .read = read_points),
     VSHI_KEY("translate", VECTOR, AT(translate), .count = 2, VSHI_ANY),
     VSHI_KEY("rotate_deg", NUMBER, AT(rotate), .lowest = -1e6, .highest = 1e6),
     VSHI_KEY("scale", NUMBER, AT(scale), .lowest = 1e-6, .highest = 1e6),
@@ -587,14 +554,13 @@ vsh_result vshi_read_flat_caster(vshi_json *reader, const vshi_value *value, voi
     p.caster.letters = vsh_text_options_default();
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     static const char *const kinds[] = {"mask", "text", "shape"};
-    static const char *const flat_whats[] = {"a mask", "a text", "a circle", "a box", "a polygon"};
+    static const char *const flat_whats[] = {"a mask", "a text", "a box"};
     int32_t type;
     VSHI_TRY(vshi_read_type(reader, value, kinds, 3, &type));
-    if (type == 2) {
-        int32_t shape = 0;
-        VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "shape", .name_of = flat_shape_name},
-                                  &shape));
-        type = VSH_FLAT_CIRCLE + shape;
+    if (type == VSH_FLAT_BOX) {
+        static const vshi_key shape = {.name = "shape", .name_of = flat_shape_name};
+        int32_t box;
+        VSHI_TRY(vshi_read_choice(reader, value, &shape, &box));
     }
     /* keys are checked even without a type, whose name may be misspelt */
     p.caster.type = type;

@@ -15,8 +15,7 @@
 
 enum {
     MAX_ITEMS = 65536,
-    MAX_LIGHTS = VSH_MAX_CHANNELS - 4, /* A and three of irradiance must fit into the image too */
-    CIRCLE_SIDES = 256
+    MAX_LIGHTS = VSH_MAX_CHANNELS - 4 /* A and three of irradiance must fit into the image too */
 };
 
 /* [x0, y0, x1, y1] */
@@ -101,18 +100,6 @@ void vsh_flat_scene_free(vsh_flat_scene *scene) {
 
 /* --- the outline of its casters */
 
-/* Makes a polygon of the circle's area, at most 1e-4 of the radius off. */
-static vsh_result make_circle(double radius, const vsh_run *run, vsh_outline **outline, vsh_error *error) {
-    const double step = 2.0 * VSHI_PI / CIRCLE_SIDES, reach = radius * sqrt(step / vshi_sin(step));
-    double points[2 * CIRCLE_SIDES];
-    for (int i = 0; i < CIRCLE_SIDES; ++i) {
-        points[2 * i] = reach * vshi_cos(step * i);
-        points[2 * i + 1] = reach * vshi_sin(step * i);
-    }
-    const size_t count = CIRCLE_SIDES;
-    return vsh_outline_from_polygons(points, &count, 1, run, outline, error);
-}
-
 static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run, vsh_outline **outline,
                               vsh_error *error) {
     const double x = caster->half_size[0], y = caster->half_size[1];
@@ -123,19 +110,14 @@ static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run,
         return vshi_outline_from_image(caster->path, &caster->mask, run, outline, error);
     case VSH_FLAT_TEXT:
         return vshi_outline_from_text(caster->text, caster->path, &caster->letters, run, outline, error);
-    case VSH_FLAT_CIRCLE:
-        return make_circle(caster->radius, run, outline, error);
     case VSH_FLAT_BOX:
         return vsh_outline_from_polygons(corners, &four, 1, run, outline, error);
-    case VSH_FLAT_POLYGON:
-        return vsh_outline_from_polygons(caster->points, &caster->point_count, 1, run, outline, error);
     default:
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "type %d: expected 0 … %d", caster->type,
-                         VSH_FLAT_POLYGON);
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "type %d: expected 0 … %d", caster->type, VSH_FLAT_BOX);
     }
 }
 
-/* Memory of a scene and of its outlines, with the rest of its text: measured with 60,000 circles. */
+/* Memory of a scene and of its outlines, with the rest of its text: measured with 60,000 casters. */
 enum { BYTES_PER_CASTER = 1536 };
 
 vsh_result vshi_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,

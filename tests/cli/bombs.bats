@@ -40,10 +40,10 @@ within() {
     within 1000 query layers.json --points points.csv --memory-limit 40MiB --quiet -o out.csv
     refused 4 "layers.json: layer 'l" "over the memory limit of 42 MB"
     { printf '{"region": [-1, -1, 1, 1], "size": 8, "lights": [{"name": "a", "type": "disc", "position": [0, 0]}], "casters": ['
-      yes '{"shape": "circle", "radius": 1},' | head -n 3000
-      printf '{"shape": "circle", "radius": 1}]}'; } >circles.json
-    within 1000 flat circles.json --memory-limit 20MiB --quiet -o out.exr
-    refused 4 "circles.json: casters[" ": about 21 MB are needed, over the memory limit of 21 MB"
+      yes '{"shape": "box", "half_size": [1, 1]},' | head -n 12800
+      printf '{"shape": "box", "half_size": [1, 1]}]}'; } >boxes.json
+    within 1000 flat boxes.json --memory-limit 20MiB --quiet -o out.exr
+    refused 4 "boxes.json: casters[" ": about 21 MB are needed, over the memory limit of 21 MB"
 }
 
 # far_cubes N: cubes so far from each other that each has inner nodes of its own in a level set's tree.

@@ -58,8 +58,7 @@ spoil() {
         spoil "$from" "$to"
         eval "refuses $words -- flat bad.json -o out.exr"
     done <<'LIST'
-"shape": "box", "half_size": \[1.5, 0.1\]|"mask": "none.png", "size": 1|3 none.png
-"shape": "box", "half_size": \[1.5, 0.1\]|"shape": "polygon", "points": [[0, 0], [1, 1], [2, 2]]|2 'casters[0]' 'no outline'
+"shape": "box", "half_size": \[1.5, 0.1\]|"mask": "none.png", "size": 1|3 'casters[0]' none.png
 LIST
     refuse_each <<'LIST'
 3 none.json | flat none.json -o out.exr

@@ -24,8 +24,7 @@ static const char scene_json[] =
 
 static const char flat_json[] =
     "{\"region\":[-2,-2,2,2],\"size\":8,\"casters\":[{\"mask\":\"mask.png\",\"size\":1},"
-    "{\"shape\":\"circle\",\"radius\":0.4,\"translate\":[1,1]},"
-    "{\"shape\":\"polygon\",\"points\":[[0,0],[1,0],[0.5,1]]}],"
+    "{\"shape\":\"box\",\"half_size\":[0.4,0.4],\"translate\":[1,1]}],"
     "\"lights\":[{\"name\":\"lamp\",\"type\":\"disc\",\"position\":[-1,1],\"radius\":0.2}],\"output\":\"o."
     "png\"}";
 

@@ -56,8 +56,9 @@ static const struct {
      "{\"casters\":[{\"mesh\":\"a.obj\"},{\"spheres\":[[0,0,0,1]],\"layer\":\"s\"}],\"resolution\":8,"
      "\"layers\":[{\"name\":\"s\",\"softness\":2}],"
      "\"lights\":[{\"name\":\"a\",\"type\":\"sphere\",\"position\":[0,3,0],\"radius\":0.3}]}"},
-    {"flat.json", "{\"region\":[-2,-2,2,2],\"size\":8,\"casters\":[{\"shape\":\"circle\",\"radius\":0.5}],"
-                  "\"lights\":[{\"name\":\"lamp\",\"type\":\"disc\",\"position\":[1,1],\"radius\":0.2}]}"},
+    {"flat.json",
+     "{\"region\":[-2,-2,2,2],\"size\":8,\"casters\":[{\"shape\":\"box\",\"half_size\":[0.5,0.5]}],"
+     "\"lights\":[{\"name\":\"lamp\",\"type\":\"disc\",\"position\":[1,1],\"radius\":0.2}]}"},
     {"points.csv", "x,y,z,nx,ny,nz\n0,1,0,0,1,0\n1,1,1,0,1,0\nnan,0,0,0,1,0\n"},
 };
 

@@ -127,7 +127,7 @@ class Reach(Case):
         v.lit_write(here / "lit.glb", model, [v.LitImage("occlusion", numpy.ones((64, 64)))], path=glb, atlas=atlas)
         v.view_write(here / "lit.html", here / "lit.glb")
         # planes and pictures
-        (here / "flat.json").write_text('{"region": [-1, -1, 1, 1], "casters": [{"shape": "circle", "radius": 0.2}], "lights": '
+        (here / "flat.json").write_text('{"region": [-1, -1, 1, 1], "casters": [{"shape": "box", "half_size": [0.2, 0.2]}], "lights": '
                                         '[{"name": "l", "type": "disc", "position": [0.5, 0.5], "radius": 0.1}]}')
         self.flat(here / "flat.json")
         camera = v.Camera().frame((-1, -1, -1), (1, 1, 1)).frame_points(positions).orbit(0.1)

@@ -261,9 +261,8 @@ TEST(every_key_lands_in_its_field) {
         "{\"mask\":\"m.png\",\"size\":[2,3],\"channel\":\"red\",\"threshold\":0.25,\"invert\":true},"
         "{\"mask\":\"/m.png\",\"size\":4,\"translate\":[1,2],\"rotate_deg\":90,\"scale\":2},"
         "{\"text\":\"a\\nb\",\"font\":\"f.ttf\",\"height\":2,\"line_spacing\":1.5,\"align\":\"right\"},"
-        "{\"shape\":\"circle\",\"radius\":2},{\"shape\":\"box\",\"half_size\":[1,2]},"
-        "{\"shape\":\"polygon\",\"points\":[[0,0],[1,0],[0,1],[-1,0.5]]}]}");
-    assert_int_equal(scene->caster_count, 6);
+        "{\"shape\":\"box\",\"half_size\":[1,2]}]}");
+    assert_int_equal(scene->caster_count, 4);
     assert_int_equal(scene->light_count, 3);
     const vsh_flat_options *o = &scene->options;
     assert_true(o->width == 300 && o->height == 200 && o->supersample == 3);
@@ -295,9 +294,7 @@ TEST(every_key_lands_in_its_field) {
     assert_true(c[2].type == VSH_FLAT_TEXT && c[2].letters.height == 2.0 && c[2].letters.line_spacing == 1.5);
     assert_true(c[2].letters.align == VSH_ALIGN_RIGHT && c[2].transform[0] == 1.0);
     assert_string_equal(c[2].text, "a\nb");
-    assert_true(c[3].type == VSH_FLAT_CIRCLE && c[3].radius == 2.0);
-    assert_true(c[4].type == VSH_FLAT_BOX && c[4].half_size[1] == 2.0);
-    assert_true(c[5].type == VSH_FLAT_POLYGON && c[5].point_count == 4 && c[5].points[7] == 0.5);
+    assert_true(c[3].type == VSH_FLAT_BOX && c[3].half_size[1] == 2.0);
     vsh_flat_scene_free(scene);
     scene = read_scene("\xef\xbb\xbf{" REGION "," LIGHTS "}");
     assert_true(scene->caster_count == 0 && scene->output == NULL && scene->options.supersample == 1);
@@ -353,13 +350,9 @@ static const struct {
     {WITH("{\"text\":@\"\",\"height\":1}"), "casters[0].text: is empty"},
     {WITH("{\"text\":\"a\",\"align\":@\"middle\"}"),
      "casters[0].align: \"middle\" is none of left, center, right"},
-    {WITH("{\"shape\":@\"star\"}"), "casters[0].shape: \"star\" is none of circle, box, polygon"},
-    {WITH("{\"shape\":\"circle\",@\"half_size\":[1,1]}"), "casters[0].half_size: is no key of a circle"},
-    {WITH("{\"shape\":\"polygon\",\"points\":@[[0,0],[1,1]]}"),
-     "casters[0].points: has 2 points, out of range 3 … 1048576"},
-    {WITH("{\"shape\":\"polygon\",\"points\":[[0,0],@[1],[1,1]]}"),
-     "casters[0].points[1]: expected 2 numbers, found 1"},
-    {WITH("{\"shape\":\"circle\",\"radius\":1,\"scale\":@[1,2]}"),
+    {WITH("{\"shape\":@\"star\"}"), "casters[0].shape: \"star\" is none of box"},
+    {WITH("{\"shape\":\"box\",@\"threshold\":0.5}"), "casters[0].threshold: is no key of a box"},
+    {WITH("{\"shape\":\"box\",\"half_size\":[1,1],\"scale\":@[1,2]}"),
      "casters[0].scale: expected a number, found an array"},
 };
 
@@ -381,22 +374,21 @@ TEST(bad_scenes_are_refused_with_their_place) {
 
 TEST(casters_become_one_outline) {
     vsh_flat_scene *scene =
-        read_scene(WITH("{\"shape\":\"circle\",\"radius\":2,\"translate\":[5,0],\"scale\":0.5},"
+        read_scene(WITH("{\"shape\":\"box\",\"half_size\":[2,2],\"translate\":[5,0],\"scale\":0.5},"
                         "{\"shape\":\"box\",\"half_size\":[1,2],\"rotate_deg\":90},"
-                        "{\"shape\":\"polygon\",\"points\":[[0,5],[0,6],[1,5]]},"
+                        "{\"shape\":\"box\",\"half_size\":[0.5,0.5],\"translate\":[0,6]},"
                         "{\"text\":\"l\",\"font\":\"" FONT "\",\"height\":2048,"
                         "\"translate\":[0,100]}"));
     vsh_outline *outline = NULL;
     assert_ok(vshi_flat_scene_casters(scene, NULL, &outline, &failure));
     const vshi_outline_info info = info_of(outline);
     assert_int_equal(info.contours, 4);
-    assert_true(fabs(info.area - (PI + 8.0 + 0.5 + 184.0 * 1556.0)) < 1e-9);
+    assert_true(fabs(info.area - (4.0 + 8.0 + 1.0 + 184.0 * 1556.0)) < 1e-9);
     const struct {
         double p[2], distance;
-    } cases[] = {
-        {{5.0, 1.5}, 0.5}, {{0.0, 3.0}, 2.0}, {{0.25, 5.5}, -0.25 * sqrt(0.5) * 1.0}, {{0.0, 0.0}, -1.0}};
-    for (size_t i = 0; i < 4; ++i) { /* the circle's sides are within 1e-4 of it */
-        assert_true(fabs(vshi_outline_distance(outline, cases[i].p) - cases[i].distance) < 2e-4);
+    } cases[] = {{{5.0, 1.5}, 0.5}, {{0.0, 3.0}, 2.0}, {{0.25, 6.0}, -0.25}, {{0.0, 0.0}, -1.0}};
+    for (size_t i = 0; i < 4; ++i) {
+        assert_near(vshi_outline_distance(outline, cases[i].p), cases[i].distance, 1e-12);
     }
     vsh_outline_free(outline);
     vsh_flat_scene_free(scene);
@@ -405,7 +397,7 @@ TEST(casters_become_one_outline) {
     assert_null(outline);
     vsh_flat_scene_free(scene);
     scene = read_scene(
-        WITH("{\"shape\":\"circle\",\"radius\":2},{\"text\":\"l\",\"font\":\"none.ttf\",\"height\":1}"));
+        WITH("{\"shape\":\"box\",\"half_size\":[1,1]},{\"text\":\"l\",\"font\":\"none.ttf\",\"height\":1}"));
     assert_fails(vshi_flat_scene_casters(scene, NULL, &outline, &failure), VSH_ERROR_READ, at("none.ttf"));
     vsh_flat_scene_free(scene);
 }
