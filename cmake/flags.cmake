@@ -60,7 +60,6 @@ function(vsh_add_kernels target)
     vsh_add_kernel(${target} lanes_${kind} shade/kernel/lanes.inc "${flags}"
                    "#define KERNEL_NAME vshi_kernel_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
     if(NOT kind STREQUAL few)
-      vsh_add_kernel(${target} terrain_${kind} trace/kernel/terrain.inc "${flags}" "#define TERRAIN_NAME vshi_terrain_${kind}\n")
       vsh_add_kernel(${target} leaf_${kind} levelset/kernel/leaf.inc "${flags}" "#define LEAF_NAME vshi_leaf_${kind}\n")
       vsh_add_kernel(${target} feet_${kind} field/kernel/feet.inc "${flags}" "#define FEET_NAME vshi_feet_${kind}\n#define FEET_WIDTH ${width}\n")
     endif()

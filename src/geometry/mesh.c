@@ -238,21 +238,6 @@ void vshi_terrain_triangle(vshi_terrain t, size_t i, uint32_t vertex[3]) {
     }
 }
 
-bool vshi_terrain_is_even(const vsh_mesh *mesh, vshi_terrain t) {
-    static const double ROUNDING = 1e-6;
-    const float *first = mesh->positions, *last = first + 3 * (t.columns * t.rows - 1);
-    const double width = (double)last[0] - (double)first[0], depth = (double)last[2] - (double)first[2];
-    for (size_t i = 0; i < t.columns * t.rows; ++i) {
-        const float *p = first + 3 * i;
-        const double x = (double)first[0] + width * ((double)(i % t.columns) / (double)(t.columns - 1));
-        const double z = (double)first[2] + depth * ((double)(i / t.columns) / (double)(t.rows - 1));
-        if (!(fabs((double)p[0] - x) <= ROUNDING * width && fabs((double)p[2] - z) <= ROUNDING * depth)) {
-            return false;
-        }
-    }
-    return true;
-}
-
 static bool grows_along_axes(const float *positions, vshi_terrain t) {
     for (size_t i = 0; i < t.columns * t.rows; ++i) {
         const float *p = positions + 3 * i;

@@ -139,9 +139,6 @@ void vshi_terrain_triangle(vshi_terrain terrain, size_t i, uint32_t vertex[3]);
 /* Whether a mesh has all triangles of a terrain in order, with x growing along columns and z along rows. */
 bool vshi_mesh_is_terrain(const vsh_mesh *mesh, vshi_terrain *terrain);
 
-/* Whether a terrain's samples lie on a grid of even steps, within the rounding of floats. */
-bool vshi_terrain_is_even(const vsh_mesh *mesh, vshi_terrain terrain);
-
 /* Fills open_edges and flipped_edges, of edges between welded vertices. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error);
 

@@ -65,11 +65,8 @@ static vsh_result load_embree(const vshi_embree **embree, vsh_error *error) {
 
 /* Bytes of a triangle in buffers and tree: 180 to 230 measured, more while the tree is built. */
 static const double TRIANGLE_BYTES = 300.0;
-/* A terrain of fewer triangles becomes a tree of them, which takes at most 200 MB, and up to a third less
- * time a ray. */
+/* A solid terrain of so many triangles becomes quads of two, which take two thirds of the memory. */
 enum { LEAST_TERRAIN = 1 << 19 };
-/* Bytes of a terrain's sample, with its share of the blocks' maxima. */
-static const double SAMPLE_BYTES = 5.4;
 /* Bytes of a quad: 97 measured, more while the tree is built. */
 static const double QUAD_BYTES = 160.0;
 
@@ -90,16 +87,6 @@ static bool watch_progress(void *user, double fraction) {
     VSHI_FLOATS;
     (void)fraction;
     return !vshi_job_advance(user, 0);
-}
-
-/* A mesh as a terrain; NULL if it is none. */
-static const vshi_terrain_part *find_terrain(const vshi_triangles *triangles, size_t mesh) {
-    for (size_t k = 0; k < triangles->terrain_count; ++k) {
-        if (triangles->terrains[k].mesh == mesh) {
-            return &triangles->terrains[k];
-        }
-    }
-    return NULL;
 }
 
 /* Sets centre and scale from the box of all corners. */
@@ -125,10 +112,8 @@ static void measure(vshi_triangles *triangles, const vsh_mesh *meshes, size_t me
         high[axis] = -DBL_MAX;
     }
     for (size_t m = 0; m < mesh_count; ++m) {
-        const bool terrain = find_terrain(triangles, m) != NULL; /* uses each vertex */
-        const size_t corners = terrain ? meshes[m].vertex_count : 3 * meshes[m].triangle_count;
-        for (size_t i = 0; i < corners; ++i) {
-            vshi_grow_box(low, high, vshi_mesh_place(&meshes[m], terrain ? i : meshes[m].indices[i]));
+        for (size_t i = 0; i < 3 * meshes[m].triangle_count; ++i) {
+            vshi_grow_box(low, high, vshi_mesh_place(&meshes[m], meshes[m].indices[i]));
         }
     }
     const size_t parts = triangles->solids != NULL ? vshi_solids_part_count(triangles->solids) : 0;
@@ -162,51 +147,25 @@ static uint8_t find_solid(const vsh_mesh *mesh, const uint8_t *sides, const uint
                                                     : 0));
 }
 
-/* Finds the large terrains that are solid beneath. */
+/* Finds the meshes whose triangles become quads. */
 static vsh_result find_terrains(vshi_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
-    VSHI_TRY(vshi_allocate((void **)&triangles->terrains, set->count, sizeof *triangles->terrains,
-                           "triangles", error));
+    VSHI_TRY(
+        vshi_allocate((void **)&triangles->cells, set->count, sizeof *triangles->cells, "triangles", error));
     for (size_t m = 0; m < set->count; ++m) {
         const vsh_mesh *mesh = &set->meshes[m];
-        const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
-        vshi_terrain grid;
+        vshi_terrain terrain;
         if (mesh->triangle_count >= LEAST_TERRAIN && mesh->mask == NULL && mesh->one_sided == 0 &&
-            vshi_mesh_is_terrain(mesh, &grid) && grid.solid && vshi_terrain_is_even(mesh, grid) &&
-            sides[0] == VSHI_SIDE_BEHIND) {
-            triangles->terrains[triangles->terrain_count++] = (vshi_terrain_part){.mesh = m, .grid = grid};
+            set->checked[m].report.degenerate_triangles == 0 && vshi_mesh_is_terrain(mesh, &terrain) &&
+            terrain.solid) {
+            triangles->cells[m] = (terrain.columns - 1) * (terrain.rows - 1);
         }
     }
-    triangles->first_terrain = (unsigned)set->count;
     return VSH_OK;
 }
 
-static vsh_result make_reliefs(vshi_triangles *triangles, const vshi_mesh_set *set, vsh_error *error) {
-    for (size_t k = 0; k < triangles->terrain_count; ++k) {
-        vshi_terrain_part *part = &triangles->terrains[k];
-        const vsh_mesh *mesh = &set->meshes[part->mesh];
-        vshi_relief *relief = &part->relief;
-        VSHI_TRY(vshi_relief_create(mesh, part->grid, triangles->centre, triangles->scale, relief, error));
-        const float *first = mesh->positions, *last = first + 3 * (part->grid.columns * part->grid.rows - 1);
-        const double from[3] = {(double)first[0], (double)relief->lowest, (double)first[2]};
-        const double to[3] = {(double)last[0], (double)relief->highest, (double)last[2]};
-        double low[3] = {DBL_MAX, DBL_MAX, DBL_MAX}, high[3] = {-DBL_MAX, -DBL_MAX, -DBL_MAX};
-        vshi_grow_box_by(low, high, mesh->transform, from, to);
-        write_point(triangles, vshi_vec_of(low), part->low);
-        write_point(triangles, vshi_vec_of(high), part->high);
-    }
-    return VSH_OK;
-}
-
-/* Vertices of a mesh's geometry: for a terrain its sides and bottom only. */
-static size_t count_vertices(const vshi_triangles *triangles, const vsh_mesh *mesh, size_t m) {
-    const vshi_terrain_part *part = find_terrain(triangles, m);
-    return part == NULL ? mesh->vertex_count : 2 * vshi_terrain_edge_length(part->grid) + 1;
-}
-
+/* Triangles of a mesh's geometry, or its quads. */
 static size_t count_triangles(const vshi_triangles *triangles, const vshi_mesh_set *set, size_t m) {
-    const vshi_terrain_part *part = find_terrain(triangles, m);
-    return part != NULL ? 3 * vshi_terrain_edge_length(part->grid)
-                        : set->meshes[m].triangle_count - set->checked[m].report.degenerate_triangles;
+    return set->meshes[m].triangle_count - set->checked[m].report.degenerate_triangles - triangles->cells[m];
 }
 
 /* Numbers the triangles of all geometries. */
@@ -214,7 +173,7 @@ static vsh_result number_triangles(vshi_triangles *triangles, const vshi_mesh_se
     size_t count = 0;
     VSHI_TRY(vshi_allocate((void **)&triangles->first, set->count, sizeof(uint32_t), "triangles", error));
     for (size_t m = 0; m < set->count; ++m) {
-        const size_t vertices = count_vertices(triangles, &set->meshes[m], m);
+        const size_t vertices = set->meshes[m].vertex_count;
         triangles->first[m] = (uint32_t)count;
         count += count_triangles(triangles, set, m);
         if (vertices > UINT32_MAX || count > UINT32_MAX) {
@@ -227,75 +186,73 @@ static vsh_result number_triangles(vshi_triangles *triangles, const vshi_mesh_se
     return vshi_allocate((void **)&triangles->solid, count, 1, "triangles", error);
 }
 
-/* Writes the sides and the bottom of a terrain. */
-static void write_sides(vshi_triangles *triangles, const vsh_mesh *mesh, vshi_terrain grid, uint8_t *solid,
-                        float *vertices, uint32_t *corners) {
-    const size_t edge = vshi_terrain_edge_length(grid), samples = grid.columns * grid.rows;
-    const size_t first = 2 * (grid.columns - 1) * (grid.rows - 1);
-    const bool mirrored = vshi_transform_determinant(mesh->transform) < 0.0;
-    for (size_t i = 0; i < 3 * edge; ++i) {
-        uint32_t of[3];
-        vshi_terrain_triangle(grid, first + i, of);
-        const size_t next = (i / 3 + 1) % edge;
-        for (size_t k = 0; k < 3; ++k) { /* first the edge's samples, then the bottom */
-            const size_t place = of[k] >= samples       ? edge + of[k] - samples
-                                 : i % 3 == 0 && k == 1 ? next
-                                                        : i / 3;
-            write_point(triangles, vshi_mesh_place(mesh, of[k]), vertices + 3 * place);
-            corners[3 * i + k] = (uint32_t)place;
-        }
-        solid[i] = mirrored ? VSHI_SOLID_BEFORE : VSHI_SOLID_BEHIND;
-    }
-    triangles->has_solids = true;
+static void set_solid(vshi_triangles *triangles, uint8_t solid, uint8_t *to) {
+    triangles->has_solids = triangles->has_solids || solid != VSHI_AIR_AROUND;
+    triangles->has_holes = triangles->has_holes || (solid & VSHI_SOLID_HOLED) != 0;
+    triangles->has_vessels = triangles->has_vessels || (solid & VSHI_SOLID_VESSEL) != 0;
+    *to = solid;
 }
 
-/* Writes the vertices and the triangles of a mesh, except for degenerate ones. */
-static void write_mesh(vshi_triangles *triangles, const vshi_mesh_set *set, size_t m, uint8_t *solid,
-                       float *vertices, uint32_t *corners) {
+/* Writes a terrain's cells as quads, which Embree splits from their second to their last corner, then its
+ * sides and bottom as quads with their last corner twice. */
+static void write_quads(vshi_triangles *triangles, const vshi_mesh_set *set, size_t m, uint8_t *solid,
+                        uint32_t *corners) {
+    const vsh_mesh *mesh = &set->meshes[m];
+    const uint32_t *given = mesh->indices;
+    for (size_t i = 0; i < triangles->cells[m]; ++i, given += 6, corners += 4) {
+        memcpy(corners, (const uint32_t[4]){given[4], given[1], given[2], given[0]}, 4 * sizeof *corners);
+    }
+    for (; given < mesh->indices + 3 * mesh->triangle_count; given += 3, corners += 4) {
+        memcpy(corners, (const uint32_t[4]){given[0], given[1], given[2], given[2]}, 4 * sizeof *corners);
+    }
+    const uint8_t side =
+        find_solid(mesh, vshi_solidity_sides(set->solidity, m), vshi_solidity_holed(set->solidity, m), 0);
+    for (size_t i = 0; i < count_triangles(triangles, set, m); ++i) {
+        set_solid(triangles, side, &solid[i]);
+    }
+}
+
+/* Writes the triangles of a mesh, except for degenerate ones. */
+static void write_triangles(vshi_triangles *triangles, const vshi_mesh_set *set, size_t m, uint8_t *solid,
+                            uint32_t *corners) {
     const vsh_mesh *mesh = &set->meshes[m];
     const uint8_t *sides = vshi_solidity_sides(set->solidity, m);
     const uint8_t *holed = vshi_solidity_holed(set->solidity, m);
-    for (size_t v = 0; v < mesh->vertex_count; ++v) {
-        write_point(triangles, vshi_mesh_place(mesh, v), vertices + 3 * v);
-    }
     for (size_t i = 0; i < mesh->triangle_count; ++i) {
-        if (vshi_mesh_degenerate(mesh, i)) {
-            continue;
+        if (!vshi_mesh_degenerate(mesh, i)) {
+            memcpy(corners, mesh->indices + 3 * i, 3 * sizeof *corners);
+            corners += 3;
+            set_solid(triangles, find_solid(mesh, sides, holed, i), solid++);
         }
-        memcpy(corners, mesh->indices + 3 * i, 3 * sizeof *corners);
-        corners += 3;
-        *solid = find_solid(mesh, sides, holed, i);
-        triangles->has_solids = triangles->has_solids || *solid != VSHI_AIR_AROUND;
-        triangles->has_holes = triangles->has_holes || (*solid & VSHI_SOLID_HOLED) != 0;
-        triangles->has_vessels = triangles->has_vessels || (*solid & VSHI_SOLID_VESSEL) != 0;
-        ++solid;
     }
 }
 
 /* Attaches mesh `m` as the geometry of that number; false if Embree fails, which keeps the reason. */
 static bool attach_mesh(vshi_triangles *triangles, const vshi_mesh_set *set, size_t m) {
     const vsh_mesh *mesh = &set->meshes[m];
-    const size_t vertex_count = count_vertices(triangles, mesh, m),
-                 count = count_triangles(triangles, set, m);
+    const size_t count = count_triangles(triangles, set, m), sides = triangles->cells[m] > 0 ? 4 : 3;
     if (count == 0) {
         return true;
     }
-    const RTCGeometry geometry =
-        triangles->embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    const RTCGeometry geometry = triangles->embree->rtcNewGeometry(
+        triangles->device, sides == 4 ? RTC_GEOMETRY_TYPE_QUAD : RTC_GEOMETRY_TYPE_TRIANGLE);
     if (geometry == NULL) {
         return false;
     }
     float *vertices = triangles->embree->rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertex_count);
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh->vertex_count);
     uint32_t *corners = triangles->embree->rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), count);
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, sides == 4 ? RTC_FORMAT_UINT4 : RTC_FORMAT_UINT3,
+        sides * sizeof(uint32_t), count);
     if (vertices != NULL && corners != NULL) {
+        for (size_t v = 0; v < mesh->vertex_count; ++v) {
+            write_point(triangles, vshi_mesh_place(mesh, v), vertices + 3 * v);
+        }
         uint8_t *solid = triangles->solid + triangles->first[m];
-        const vshi_terrain_part *part = find_terrain(triangles, m);
-        if (part != NULL) {
-            write_sides(triangles, mesh, part->grid, solid, vertices, corners);
+        if (sides == 4) {
+            write_quads(triangles, set, m, solid, corners);
         } else {
-            write_mesh(triangles, set, m, solid, vertices, corners);
+            write_triangles(triangles, set, m, solid, corners);
         }
         vshi_sieve_attach(triangles, m, geometry, vertices, corners);
         triangles->embree->rtcCommitGeometry(geometry);
@@ -380,12 +337,7 @@ static vsh_result build(vshi_triangles *triangles, const vshi_mesh_set *set, vsh
             return vshi_job_fail_cancelled(job, error);
         }
     }
-    for (size_t k = 0; k < triangles->terrain_count; ++k) {
-        if (!vshi_triangles_attach_terrain(triangles, k)) {
-            return fail_build(triangles, job, error);
-        }
-    }
-    if (triangles->solids != NULL && !vshi_triangles_attach_solids(triangles)) {
+    if (triangles->solids != NULL && !vshi_triangles_attach_solids(triangles, (unsigned)set->count)) {
         return fail_build(triangles, job, error);
     }
     VSHI_TRY(build_tree(triangles, job, error));
@@ -460,18 +412,14 @@ vsh_result vshi_triangles_create_beside(const vsh_mesh *meshes, size_t mesh_coun
     VSHI_TRY_DONE(find_terrains(made, &set, error));
     double bytes = 0.0;
     for (size_t m = 0; m < mesh_count; ++m) {
-        const double vertices = (double)count_vertices(made, &set.meshes[m], m);
-        const double faces = (double)count_triangles(made, &set, m);
-        const vshi_terrain_part *part = find_terrain(made, m);
-        bytes += 12.0 * vertices + TRIANGLE_BYTES * faces +
-                 (part != NULL ? SAMPLE_BYTES * (double)meshes[m].vertex_count : 0.0);
+        bytes += 12.0 * (double)set.meshes[m].vertex_count +
+                 (made->cells[m] > 0 ? QUAD_BYTES : TRIANGLE_BYTES) * (double)count_triangles(made, &set, m);
     }
     VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
     VSHI_TRY_DONE(vshi_sieves_create(made, set.meshes, set.count, &full, bytes, error));
     made->limit = full.memory_limit;
     made->solids = solids;
     measure(made, set.meshes, set.count);
-    VSHI_TRY_DONE(make_reliefs(made, &set, error));
     job = vshi_job_begin(&full, "triangles", 1);
     if (job == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
@@ -507,10 +455,7 @@ void vshi_triangles_free(vshi_triangles *triangles) {
         triangles->embree->rtcReleaseDevice(triangles->device);
     }
     vshi_sieves_free(triangles);
-    for (size_t k = 0; k < triangles->terrain_count; ++k) {
-        vshi_relief_free(&triangles->terrains[k].relief);
-    }
-    free(triangles->terrains);
+    free(triangles->cells);
     free(triangles->solid);
     free(triangles->first);
     free(triangles);
@@ -518,10 +463,5 @@ void vshi_triangles_free(vshi_triangles *triangles) {
 
 uint64_t vshi_triangles_bytes(const vshi_triangles *triangles) {
     const long long bytes = atomic_load(&triangles->bytes);
-    size_t reliefs = 0;
-    for (size_t k = 0; k < triangles->terrain_count; ++k) {
-        reliefs += triangles->terrains[k].relief.bytes;
-    }
-    return sizeof *triangles + triangles->sieve_bytes + reliefs + (bytes > 0 ? (uint64_t)bytes : 0) +
-           triangles->count;
+    return sizeof *triangles + triangles->sieve_bytes + (bytes > 0 ? (uint64_t)bytes : 0) + triangles->count;
 }

@@ -1,5 +1,5 @@
 /* Geometries of an Embree scene that need code of ours: triangles that let rays pass (masks and one-sided
- * faces), procedural solids, and the tops of terrains. */
+ * faces) and procedural solids. */
 #include "trace/embree_scene.h"
 
 #include "base/floats.h"
@@ -159,40 +159,11 @@ void vshi_sieve_attach(const vshi_triangles *triangles, size_t mesh, RTCGeometry
     }
 }
 
-/* Adds a geometry of `count` primitives of our own as geometry `number`. */
-static bool attach_geometry(const vshi_triangles *triangles, unsigned number, size_t count, void *user,
-                            RTCBoundsFunction bounds, RTCIntersectFunctionN intersect,
-                            RTCOccludedFunctionN occlude) {
-    const vshi_embree *embree = triangles->embree;
-    const RTCGeometry geometry = embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_USER);
-    if (geometry == NULL) {
-        return false;
-    }
-    embree->rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)count);
-    embree->rtcSetGeometryUserData(geometry, user);
-    embree->rtcSetGeometryBoundsFunction(geometry, bounds, NULL);
-    embree->rtcSetGeometryIntersectFunction(geometry, intersect);
-    embree->rtcSetGeometryOccludedFunction(geometry, occlude);
-    embree->rtcCommitGeometry(geometry);
-    embree->rtcAttachGeometryByID(triangles->scene, geometry, number);
-    embree->rtcReleaseGeometry(geometry);
-    return true;
-}
-
 /* --- solids: one geometry, whose primitives are the parts of their union. Rays meet them by sphere tracing,
  * at world coordinates in double precision. */
 
 /* Rounding of floats moves a box by less than this part of the scene's size. */
 static const double MARGIN = 0x1p-20;
-
-static void set_bounds(struct RTCBounds *box, const float low[3], const float high[3]) {
-    *box = (struct RTCBounds){.lower_x = low[0],
-                              .lower_y = low[1],
-                              .lower_z = low[2],
-                              .upper_x = high[0],
-                              .upper_y = high[1],
-                              .upper_z = high[2]};
-}
 
 static void find_part_bounds(const struct RTCBoundsFunctionArguments *args) {
     VSHI_FLOATS;
@@ -204,7 +175,12 @@ static void find_part_bounds(const struct RTCBoundsFunctionArguments *args) {
         lowest[axis] = (float)((low[axis] - triangles->centre[axis]) * triangles->scale - MARGIN);
         highest[axis] = (float)((high[axis] - triangles->centre[axis]) * triangles->scale + MARGIN);
     }
-    set_bounds(args->bounds_o, lowest, highest);
+    *args->bounds_o = (struct RTCBounds){.lower_x = lowest[0],
+                                         .lower_y = lowest[1],
+                                         .lower_z = lowest[2],
+                                         .upper_x = highest[0],
+                                         .upper_y = highest[1],
+                                         .upper_z = highest[2]};
 }
 
 /* The distance at which lane i's ray meets a part, the scene's units; infinite if it does not. */
@@ -246,148 +222,19 @@ static void intersect_parts(const struct RTCIntersectFunctionNArguments *args) {
     }
 }
 
-bool vshi_triangles_attach_solids(vshi_triangles *triangles) {
-    const unsigned number = triangles->first_terrain + (unsigned)triangles->terrain_count;
-    return attach_geometry(triangles, number, vshi_solids_part_count(triangles->solids), triangles,
-                           find_part_bounds, intersect_parts, occlude_parts);
-}
-
-/* --- terrains: a primitive for all of the top, whose rays trace/terrain.h follows. On a map of 4096²,
- * triangles take 40 times the memory, and Embree's grids four times the time. */
-
-enum { LANES = VSHI_TERRAIN_LANES };
-
-/* The search for the next crossing begins so many cells beyond the last one. */
-static const double PAST = 1e-4;
-
-/* Room around the box for the rounding of floats, the scene's units. */
-static const float ROOM = 1e-5f;
-
-static void find_top_bounds(const struct RTCBoundsFunctionArguments *args) {
-    const vshi_terrain_part *part = args->geometryUserPtr;
-    float low[3], high[3];
-    for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = part->low[axis] - ROOM;
-        high[axis] = part->high[axis] + ROOM;
+bool vshi_triangles_attach_solids(vshi_triangles *triangles, unsigned number) {
+    const vshi_embree *embree = triangles->embree;
+    const RTCGeometry geometry = embree->rtcNewGeometry(triangles->device, RTC_GEOMETRY_TYPE_USER);
+    if (geometry == NULL) {
+        return false;
     }
-    set_bounds(args->bounds_o, low, high);
-}
-
-/* A packet of rays against the top of a terrain. */
-typedef struct packet {
-    const vshi_terrain_part *part;
-    struct RTCIntersectContext *context;
-    const float *ray; /* rows of `count` values */
-    size_t count;
-    unsigned mesh;
-    vshi_terrain_rays rays;
-} packet;
-
-static void aim_lane(const packet *p, size_t i, double from, vshi_terrain_rays *rays, int lane) {
-    float origin[3], direction[3];
-    for (size_t axis = 0; axis < 3; ++axis) {
-        origin[axis] = p->ray[(VSHI_RAY_ORIGIN + axis) * p->count + i];
-        direction[axis] = p->ray[(VSHI_RAY_DIRECTION + axis) * p->count + i];
-    }
-    vshi_terrain_aim(&p->part->relief, origin, direction, from, (double)p->ray[VSHI_RAY_FAR * p->count + i],
-                     lane, rays);
-}
-
-/* Traces the valid rays. */
-static void trace_packet(packet *p, const int *valid) {
-    for (size_t i = 0; i < LANES; ++i) {
-        if (i < p->count && valid[i] == -1) {
-            aim_lane(p, i, (double)p->ray[VSHI_RAY_NEAR * p->count + i], &p->rays, (int)i);
-        } else {
-            vshi_terrain_leave(&p->rays, (int)i);
-        }
-    }
-    vshi_terrain_trace(&p->part->relief, &p->rays);
-}
-
-/* Whether the context's filter accepts a hit of ray i at `length`. */
-static bool is_accepted(const packet *p, size_t i, double length, vshi_vec normal) {
-    if (p->context->filter == NULL) {
-        return true;
-    }
-    float one[VSHI_RAY_ROWS];
-    for (size_t row = 0; row < VSHI_RAY_ROWS; ++row) {
-        one[row] = p->ray[row * p->count + i];
-    }
-    one[VSHI_RAY_FAR] = (float)length;
-    struct RTCHit hit = {.Ng_x = (float)normal.x,
-                         .Ng_y = (float)normal.y,
-                         .Ng_z = (float)normal.z,
-                         .geomID = p->mesh,
-                         .instID = {RTC_INVALID_GEOMETRY_ID}};
-    int valid = -1;
-    const struct RTCFilterFunctionNArguments args = {.valid = &valid,
-                                                     .geometryUserPtr = (void *)(uintptr_t)p->part,
-                                                     .context = p->context,
-                                                     .ray = (struct RTCRayN *)one,
-                                                     .hit = (struct RTCHitN *)&hit,
-                                                     .N = 1};
-    p->context->filter(&args);
-    return valid == -1;
-}
-
-/* Finds the first accepted hit of ray i; false if there is none. */
-static bool find_hit(const packet *p, size_t i, double *length, vshi_vec *normal) {
-    const vshi_terrain_rays *rays = &p->rays;
-    vshi_terrain_rays next;
-    for (int lane = (int)i;; lane = 0) {
-        if (!(rays->hit[lane] < INFINITY)) {
-            return false;
-        }
-        *length = (rays->begin[lane] + (double)rays->hit[lane]) / rays->speed[lane];
-        *normal = vshi_terrain_normal(&p->part->relief, rays, lane, rays->hit[lane]);
-        if (is_accepted(p, i, *length, *normal)) {
-            return true;
-        }
-        for (int other = 1; other < LANES; ++other) {
-            vshi_terrain_leave(&next, other);
-        }
-        aim_lane(p, i, *length + PAST / p->rays.speed[i], &next, 0);
-        vshi_terrain_trace(&p->part->relief, &next);
-        rays = &next;
-    }
-}
-
-static void occlude_top(const struct RTCOccludedFunctionNArguments *args) {
-    float *ray = (float *)args->ray;
-    packet p = {args->geometryUserPtr, args->context, ray, args->N, args->geomID, {.to = {0}}};
-    trace_packet(&p, args->valid);
-    for (size_t i = 0; i < args->N; ++i) {
-        double length;
-        vshi_vec normal;
-        if (args->valid[i] == -1 && find_hit(&p, i, &length, &normal)) {
-            ray[VSHI_RAY_FAR * args->N + i] = -INFINITY;
-        }
-    }
-}
-
-static void intersect_top(const struct RTCIntersectFunctionNArguments *args) {
-    const size_t n = args->N;
-    float *ray = (float *)args->rayhit, *hit = ray + VSHI_RAY_ROWS * n;
-    packet p = {args->geometryUserPtr, args->context, ray, n, args->geomID, {.to = {0}}};
-    trace_packet(&p, args->valid);
-    for (size_t i = 0; i < n; ++i) {
-        double length;
-        vshi_vec normal;
-        if (args->valid[i] != -1 || !find_hit(&p, i, &length, &normal)) {
-            continue;
-        }
-        ray[VSHI_RAY_FAR * n + i] = (float)length;
-        hit[VSHI_HIT_NORMAL * n + i] = (float)normal.x;
-        hit[(VSHI_HIT_NORMAL + 1) * n + i] = (float)normal.y;
-        hit[(VSHI_HIT_NORMAL + 2) * n + i] = (float)normal.z;
-        hit[VSHI_HIT_U * n + i] = hit[VSHI_HIT_V * n + i] = 0.0f;
-        ((unsigned *)hit)[VSHI_HIT_TRIANGLE * n + i] = 0;
-        ((unsigned *)hit)[VSHI_HIT_MESH * n + i] = args->geomID;
-    }
-}
-
-bool vshi_triangles_attach_terrain(const vshi_triangles *triangles, size_t number) {
-    return attach_geometry(triangles, triangles->first_terrain + (unsigned)number, 1,
-                           &triangles->terrains[number], find_top_bounds, intersect_top, occlude_top);
+    embree->rtcSetGeometryUserPrimitiveCount(geometry, (unsigned)vshi_solids_part_count(triangles->solids));
+    embree->rtcSetGeometryUserData(geometry, triangles);
+    embree->rtcSetGeometryBoundsFunction(geometry, find_part_bounds, NULL);
+    embree->rtcSetGeometryIntersectFunction(geometry, intersect_parts);
+    embree->rtcSetGeometryOccludedFunction(geometry, occlude_parts);
+    embree->rtcCommitGeometry(geometry);
+    embree->rtcAttachGeometryByID(triangles->scene, geometry, number);
+    embree->rtcReleaseGeometry(geometry);
+    return true;
 }

@@ -3,7 +3,6 @@
 
 #include "geometry/alpha_mask.h"
 #include "trace/embree.h"
-#include "trace/terrain.h"
 
 #include <stdint.h>
 
@@ -53,14 +52,6 @@ enum { VSHI_SOLID_HOLED = 4 };
 /* Flag of an open solid's faces (vshi_component.vessel). */
 enum { VSHI_SOLID_VESSEL = 8 };
 
-/* A mesh that is a terrain. Its sides and bottom are ordinary triangles; its top is a geometry of its own. */
-typedef struct vshi_terrain_part {
-    size_t mesh;
-    vshi_terrain grid;
-    vshi_relief relief;
-    float low[3], high[3]; /* box around its top, in the scene's units */
-} vshi_terrain_part;
-
 /* A copy of a mask's texels. */
 typedef struct vshi_texture {
     uint8_t *alpha;
@@ -85,12 +76,10 @@ struct vshi_triangles {
     const vshi_embree *embree;
     RTCDevice device;
     RTCScene scene;
-    size_t count;                /* triangles of all geometries, numbered in order */
-    uint32_t *first;             /* number of each geometry's first triangle */
-    uint8_t *solid;              /* [count]: VSHI_SOLID_… */
-    vshi_terrain_part *terrains; /* [terrain_count] */
-    size_t terrain_count;
-    unsigned first_terrain;                  /* geometries from here on are the tops of terrains */
+    size_t count;                            /* triangles or quads of all geometries, numbered in order */
+    uint32_t *first;                         /* number of each geometry's first triangle */
+    uint8_t *solid;                          /* [count]: VSHI_SOLID_… */
+    size_t *cells;                           /* of the meshes: of terrains, which are quads; else 0 */
     bool has_solids, has_holes, has_vessels; /* any triangle has such */
     bool wide;                               /* VSHI_PACKET rays are traced at once, not in two halves */
     double low[3], high[3]; /* the triangles' box, world space; low > high if there are none */
@@ -101,7 +90,7 @@ struct vshi_triangles {
     vshi_sieve *sieves; /* [sieve_count], of the geometries; NULL: none lets rays through */
     size_t sieve_count, texture_count, sieve_bytes;
     vshi_texture *textures;
-    const vshi_solids *solids; /* the geometry after the terrains; may be NULL */
+    const vshi_solids *solids; /* the geometry after the meshes; may be NULL */
     bool owns_solids;
     uint64_t limit; /* bytes that Embree may hold; 0: no limit */
     atomic_llong bytes;
@@ -110,8 +99,7 @@ struct vshi_triangles {
 
 /* VSHI_SOLID_… of a primitive of a geometry. */
 static inline uint8_t vshi_triangles_solid(const vshi_triangles *triangles, unsigned mesh, unsigned local) {
-    return mesh >= triangles->first_terrain ? VSHI_SOLID_BEHIND
-                                            : triangles->solid[triangles->first[mesh] + local];
+    return triangles->solid[triangles->first[mesh] + local];
 }
 
 /* Rows of N values of a packet's rays and hits; Embree names them in C++ only. Hits follow their rays. */
@@ -124,13 +112,11 @@ static inline vshi_vec vshi_packet_vector(const void *packet, size_t row, size_t
     return (vshi_vec){(double)at[0], (double)at[lanes], (double)at[2 * lanes]};
 }
 
-/* How Embree traces a packet: its rays together, or one by one if they diverge. Terrains always trace a
- * packet's rays together. */
+/* How Embree traces a packet: its rays together, or one by one if they diverge. */
 static inline enum RTCIntersectContextFlags vshi_triangles_flags(const vshi_triangles *triangles,
                                                                  bool together) {
-    return !triangles->fine && (together || triangles->terrain_count > 0)
-               ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-               : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+    return !triangles->fine && together ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                        : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
 }
 
 /* Rays traced at a time if the machine has vectors so wide; else twice half as many. On the cloister, towards
@@ -146,14 +132,10 @@ enum { VSHI_PACKET = 16 };
 void vshi_triangles_occlude(const vshi_triangles *triangles, const int *valid,
                             struct RTCIntersectContext *context, struct RTCRay16 *packet);
 
-/* --- geometries with code of ours (embree_geometries.c). Functions that attach one return false if Embree
- * fails, which keeps the reason. */
+/* --- geometries with code of ours (embree_geometries.c) */
 
-/* Adds triangles->solids. */
-bool vshi_triangles_attach_solids(vshi_triangles *triangles);
-
-/* Adds the top of terrain `number`. */
-bool vshi_triangles_attach_terrain(const vshi_triangles *triangles, size_t number);
+/* Adds triangles->solids as geometry `number`; false if Embree fails, which keeps the reason. */
+bool vshi_triangles_attach_solids(vshi_triangles *triangles, unsigned number);
 
 /* Makes sieves of the meshes; triangles->sieves stays NULL if none is needed. `held` bytes are in use.
  * Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */

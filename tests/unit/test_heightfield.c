@@ -10,7 +10,6 @@
 #include "scene/scene.h"
 #include "shapes/heights.h"
 #include "trace/embree.h"
-#include "trace/terrain.h"
 #include "traced.h"
 #include <vdbshade/occluders.h>
 #include <vdbshade/scene.h>
@@ -212,8 +211,8 @@ static vshi_segment_ray random_ray(const vshi_triangles *of, int number, uint32_
     return ray;
 }
 
-TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
-    enum { RAYS = 20000, COLUMNS = 500, ROWS = 530 }; /* smaller terrains are triangles */
+TEST(rays_meet_a_large_terrain_as_they_meet_its_triangles) {
+    enum { RAYS = 20000, COLUMNS = 500, ROWS = 530 }; /* at least 2^19 triangles */
     static const double transforms[][12] = {
         {-0.6, 0.8, 0, 5, 0.8, 0.6, 0, 1e3, 0, 0, 1, 0},       /* mirrored, and tilted */
         {1e-3, 2e-4, 0, 0, 0, 4e-3, 0, 0, 1e-4, 0, 1e-3, 0.1}, /* sheared */
@@ -228,7 +227,7 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
         mesh.transform = transforms[i];
         const vsh_mesh other = reindexed(&mesh, indices);
         OWNED(vshi_triangles) *terrain = triangles_from(&mesh, 1), *triangles = triangles_from(&other, 1);
-        assert_less(vshi_triangles_bytes(terrain), vshi_triangles_bytes(triangles) / 4);
+        assert_less(vshi_triangles_bytes(terrain), vshi_triangles_bytes(triangles) * 3 / 4);
         uint32_t seed = (uint32_t)i;
         int apart[4] = {0};
         for (int k = 0; k < RAYS; ++k) {
@@ -254,54 +253,6 @@ TEST(rays_meet_a_terrain_as_they_meet_its_triangles) {
             assert_less(apart[k], RAYS / 1000);
         }
     }
-}
-
-TEST(every_instruction_set_finds_the_same_crossings) {
-    static const struct {
-        int32_t isa;
-        vshi_terrain_kernel *kernel;
-    } sets[] = {
-        {VSH_ISA_BASE, vshi_terrain_base},
-#if defined(__x86_64__)
-        {VSH_ISA_AVX2, vshi_terrain_avx2},
-        {VSH_ISA_AVX512, vshi_terrain_avx512}
-#endif
-    };
-    FREED float *values = hills(SIDE, SIDE);
-    const vsh_heights_source source = source_of(values, SIDE, SIDE, 10.0, 2.0);
-    OWNED(vsh_model) *model = model_of(&source, VSH_HEIGHTS_SOLID);
-    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    vshi_terrain grid;
-    FREED_BY(vshi_relief_free) vshi_relief relief;
-    assert_true(vshi_mesh_is_terrain(&mesh, &grid));
-    const double centre[3] = {0.0, 0.0, 0.0};
-    assert_ok(vshi_relief_create(&mesh, grid, centre, 1.0, &relief, &failure));
-    uint32_t seed = 7;
-    int crossed = 0;
-    for (int i = 0; i < 2000; ++i) {
-        vshi_terrain_rays rays;
-        for (int lane = 0; lane < VSHI_TERRAIN_LANES; ++lane) {
-            float origin[3], direction[3];
-            for (int k = 0; k < 3; ++k) {
-                origin[k] = (float)(k == 1 ? 3.0 * next_random(&seed) : 12.0 * next_random(&seed) - 6.0);
-                direction[k] = (float)(next_random(&seed) - 0.5);
-            }
-            vshi_terrain_aim(&relief, origin, direction, 0.0, lane % 3 == 0 ? 5.0 : INFINITY, lane, &rays);
-        }
-        float first[VSHI_TERRAIN_LANES];
-        for (size_t k = 0; k < COUNT_OF(sets); ++k) {
-            if (vshi_isa_available(sets[k].isa) == 0) {
-                continue;
-            }
-            sets[k].kernel(&relief, &rays);
-            if (k == 0) {
-                memcpy(first, rays.hit, sizeof first);
-                crossed += first[0] < INFINITY || first[1] < INFINITY;
-            }
-            assert_memory_equal(first, rays.hit, sizeof first);
-        }
-    }
-    assert_true(crossed > 500);
 }
 
 static vsh_caster terrain_caster(const char *path, double width, double depth, double height) {
