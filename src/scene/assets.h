@@ -59,17 +59,12 @@ enum { VSHI_RESOLUTION_NAMED = -1 };
 int32_t vshi_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, const vsh_scene_layer *layer,
                               double points);
 
-/* Makes all casters ready for vshi_trace_shadow() and vshi_trace_ao(), whatever their layers: meshes and
- * heightfields as triangles, procedural shapes as solids. Each is NULL if there are none. Free them with
- * vshi_triangles_free() and vshi_solids_free(). Errors: VSH_ERROR_ARGUMENT (run); as vshi_triangles_create()
- * and vshi_solids_create(). */
+/* Makes all casters ready for a vshi_truth, whatever their layers: meshes and heightfields as triangles,
+ * procedural shapes as solids. Each is NULL if there are none. Free them with vshi_triangles_free() and
+ * vshi_solids_free(). Errors: VSH_ERROR_ARGUMENT (run); as vshi_triangles_create() and vshi_solids_create().
+ */
 vsh_result vshi_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                             vshi_triangles **triangles, vshi_solids **solids, vsh_error *error);
-
-/* Reach, world units > 0, that a field of `grid` needs for the scene's lights and AO at receivers within a
- * world box: see vshi_field_options. Directional lights count up to a half angle of 60°. */
-double vshi_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
-                        const double receivers_max[3]);
 
 /* The pages of a receiver: one, one for each object, or those of an atlas. Meshes are sorted by pages. An
  * atlas cuts them along their charts; a mesh on several pages has a part on each, all of one object. */

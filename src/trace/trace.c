@@ -1,27 +1,13 @@
 /* Visibility of lights and of the sky from points, by rays against the casters, without a field. */
 #include "trace/trace.h"
-#include "base/elementary.h"
-#include "base/floats.h"
-#include "base/memory.h"
-#include "base/parallel.h"
 #include "base/vec.h"
 #include "light/light.h"
 #include "trace/embree.h"
 #include "trace/solids.h"
 
-#include <stdlib.h>
 #include <string.h>
 
-enum { MAX_RAYS = 65536, AT_ONCE = 256, GRAIN = 64 };
-
-/* A call whose points all shoot the same rays. */
-typedef struct tracing {
-    vshi_truth truth;
-    const double *positions;
-    const float *normals;
-    double (*disc)[2]; /* [truth.rays] */
-    float *values;
-} tracing;
+enum { AT_ONCE = 256 };
 
 /* A light as a disc a unit away, or a dome. */
 typedef struct target {
@@ -33,18 +19,6 @@ typedef struct target {
     double size;     /* of the sphere */
     vshi_light_view view;
 } target;
-
-/* Places points along Vogel's spiral ("A better way to construct the sunflower head", 1979). Radii √((i + ½)
- * / n) spread them evenly over the disc. */
-static void place_disc(tracing *task) {
-    static const double PI = 3.14159265358979323846, TURN = 0.38196601125010515;
-    const int32_t rays = task->truth.rays;
-    for (int32_t i = 0; i < rays; ++i) {
-        const double radius = sqrt((i + 0.5) / rays), angle = 2.0 * PI * fmod(i * TURN, 1.0);
-        task->disc[i][0] = radius * vshi_cos(angle);
-        task->disc[i][1] = radius * vshi_sin(angle);
-    }
-}
 
 /* Aims at the light from a point. */
 static vshi_light_side aim(const vshi_light_place *place, vshi_vec from, target *t) {
@@ -122,7 +96,7 @@ static vshi_cone_state prove(const vshi_truth *truth, vshi_vec origin, const tar
 
 /* The origin and the target of a point's rays. */
 typedef struct viewpoint {
-    vshi_vec origin, normal; /* no normal: zero */
+    vshi_vec origin, normal;
     target target;
     const vshi_vec *over;      /* rays below this plane count as hidden; NULL: none */
     const vshi_solids *solids; /* that rays may meet */
@@ -145,23 +119,16 @@ static void aim_dome(const vshi_truth *truth, vshi_vec face, target *t) {
 /* Returns false if the point's value needs no rays, and is in *value. `face` is of AO; NULL: the normal. */
 static bool place_point(const vshi_truth *truth, const double position[3], const float *normal,
                         const float *face, viewpoint *from, double *value) {
-    *from = (viewpoint){.origin = vshi_vec_of(position)};
-    if (normal != NULL) {
-        from->normal = vshi_unit(vshi_vec_off(normal));
-        if (!(vshi_dot(from->normal, from->normal) > 0.5)) {
-            *value = NAN;
-            return false;
-        }
-        const vshi_vec up = face != NULL ? vshi_vec_off(face) : from->normal;
-        from->origin = vshi_add(from->origin, vshi_scale(up, truth->lift));
-    }
-    if (!vshi_finite(from->origin)) {
+    const vshi_vec unit = vshi_unit(vshi_vec_off(normal)), up = face != NULL ? vshi_vec_off(face) : unit;
+    *from =
+        (viewpoint){.origin = vshi_add(vshi_vec_of(position), vshi_scale(up, truth->lift)), .normal = unit};
+    if (!(vshi_dot(unit, unit) > 0.5 && vshi_finite(from->origin))) {
         *value = NAN;
         return false;
     }
     from->target = (target){.axis = from->normal, .radius = 1.0, .lean = VSHI_WHOLE_DOME};
     if (truth->light == NULL) {
-        aim_dome(truth, face != NULL ? vshi_vec_off(face) : from->normal, &from->target);
+        aim_dome(truth, up, &from->target);
     } else {
         const vshi_light_side side = aim(&truth->place, from->origin, &from->target);
         if (side != VSHI_LIGHT_SEEN) {
@@ -175,7 +142,7 @@ static bool place_point(const vshi_truth *truth, const double position[3], const
         return false;
     }
     from->solids = state == VSHI_CONE_FREE ? NULL : truth->solids;
-    from->over = truth->light == NULL ? truth->up : normal != NULL ? &from->normal : NULL;
+    from->over = truth->light == NULL ? truth->up : &from->normal;
     return true;
 }
 
@@ -206,18 +173,6 @@ static int32_t count_free(const vshi_truth *truth, const viewpoint *from, const 
         }
     }
     return free;
-}
-
-static float trace_point(const tracing *task, size_t point) {
-    viewpoint from;
-    double value;
-    const float *normal = task->normals != NULL ? task->normals + 3 * point : NULL;
-    if (!place_point(&task->truth, task->positions + 3 * point, normal, NULL, &from, &value)) {
-        return (float)value;
-    }
-    const int32_t rays = task->truth.rays;
-    const int32_t free = count_free(&task->truth, &from, (const double(*)[2])task->disc, rays);
-    return (float)((double)free / (double)rays);
 }
 
 /* Whether rays agree with an expected value. Few rays that agree with each other only are not enough: they
@@ -290,81 +245,4 @@ void vshi_truth_settle(int32_t rays, const int32_t free[2], int32_t even, double
     for (int k = 0; k < 2; ++k) {
         seen[k] = ends ? (double)all / (double)first : (double)free[k] / (double)rays;
     }
-}
-
-static void trace_points(void *user, size_t begin, size_t end) {
-    const tracing *task = user;
-    for (size_t i = begin; i < end; ++i) {
-        task->values[i] = trace_point(task, i);
-    }
-}
-
-static vsh_result trace(tracing *task, size_t count, const vsh_run *run, vsh_error *error) {
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    VSHI_TRY(
-        vshi_allocate((void **)&task->disc, (size_t)task->truth.rays, sizeof *task->disc, "trace", error));
-    place_disc(task);
-    vshi_job *job = vshi_job_begin(&full, "trace", count);
-    const vsh_result result = job == NULL
-                                  ? vshi_fail(error, VSH_ERROR_MEMORY, "trace: the system refused memory")
-                                  : vshi_parallel_for(job, count, GRAIN, 1, trace_points, task, error);
-    vshi_job_end(job);
-    free(task->disc);
-    return result;
-}
-
-static vsh_result check(const tracing *task, size_t count, const char *call, vsh_error *error) {
-    const bool nothing = task->truth.triangles == NULL && task->truth.solids == NULL;
-    if (nothing || (count > 0 && (task->positions == NULL || task->values == NULL))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s NULL", call,
-                         nothing                   ? "both triangles and solids are"
-                         : task->positions == NULL ? "positions is"
-                                                   : "the result's array is");
-    }
-    if (task->truth.rays < 1 || task->truth.rays > MAX_RAYS) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: rays %d is out of range 1 … %d", call,
-                         task->truth.rays, MAX_RAYS);
-    }
-    if (!(task->truth.lift >= 0.0 && isfinite(task->truth.lift))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: lift %g: expected a finite number, at least 0", call,
-                         task->truth.lift);
-    }
-    return VSH_OK;
-}
-
-vsh_result vshi_trace_shadow(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
-                             const double *positions, const float *normals, double lift,
-                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
-                             vsh_error *error) {
-    VSHI_FLOATS;
-    tracing task = {
-        .truth = {.triangles = triangles, .solids = solids, .lift = lift, .light = light, .rays = rays},
-        .positions = positions,
-        .normals = normals,
-        .values = visibility};
-    VSHI_TRY(check(&task, count, "vshi_trace_shadow", error));
-    VSHI_TRY(vsh_light_check(light, error));
-    task.truth.place = vshi_light_in_world(light);
-    /* all rays to a point are the same */
-    task.truth.rays = vshi_light_is_point(&task.truth.place) ? 1 : rays;
-    return trace(&task, count, run, error);
-}
-
-vsh_result vshi_trace_ao(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
-                         const double *positions, const float *normals, double lift, double distance,
-                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error) {
-    VSHI_FLOATS;
-    tracing task = {
-        .truth = {.triangles = triangles, .solids = solids, .lift = lift, .distance = distance, .rays = rays},
-        .positions = positions,
-        .normals = normals,
-        .values = ao};
-    VSHI_TRY(check(&task, count, "vshi_trace_ao", error));
-    VSHI_NEEDS_OF(count, normals);
-    if (!(distance > 0.0)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_trace_ao: distance %g: expected more than 0",
-                         distance);
-    }
-    return trace(&task, count, run, error);
 }

@@ -39,24 +39,6 @@ void vshi_triangles_free(vshi_triangles *triangles); /* NULL does nothing */
 /* Bytes in memory. Cannot fail. */
 uint64_t vshi_triangles_bytes(const vshi_triangles *triangles);
 
-/* Fraction of a light that each of `count` points [count][3] sees, into visibility[count]: `rays` rays (1 …
- * 65536) over the light's disc (Vogel's spiral, 1979), that begin `lift` world units above the point along
- * its normal [count][3] (unit; NULL: no horizon) and count as hidden below the normal's plane. Either of
- * `triangles` and `solids` may be NULL, for none; a ray is hidden that meets one of them. Rays pass no nearer
- * to a solid than a billionth of the box around all of them, so points on a solid's surface need a lift above
- * that. (J. C. Hart, "Sphere tracing", 1996; a cone that is proved free of solids, or covered by one, stands
- * for its rays.) Thread safe. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_CANCELLED, VSH_ERROR_MEMORY. */
-vsh_result vshi_trace_shadow(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
-                             const double *positions, const float *normals, double lift,
-                             const vsh_light *light, int32_t rays, const vsh_run *run, float *visibility,
-                             vsh_error *error);
-
-/* Cosine-weighted fraction of the hemisphere that is free within `distance`, likewise; normals must be given.
- */
-vsh_result vshi_trace_ao(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
-                         const double *positions, const float *normals, double lift, double distance,
-                         int32_t rays, const vsh_run *run, float *ao, vsh_error *error);
-
 /* First rays of each set of a point. If they agree with the expected value, the point shoots no more. */
 enum { VSHI_TRUTH_FIRST = 16 };
 

@@ -198,17 +198,13 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-static vsh_result trace(const vsh_run *run, vsh_error *error) {
+static vsh_result make_casters(const vsh_run *run, vsh_error *error) {
     OWNED(vsh_model) *model = NULL;
     OWNED(vshi_triangles) *triangles = NULL;
     OWNED(vshi_solids) *solids = NULL;
     OWNED(vsh_occluders) *occluders = NULL;
     vsh_occluders_options few = vsh_occluders_options_default();
     few.grid.resolution = 10;
-    double positions[3 * POINTS];
-    float normals[3 * POINTS], values[POINTS];
-    parts_place(positions, normals);
-    const vsh_light light = vsh_light_default();
     const vsh_sdf_node node = vsh_sdf_node_default();
     const vsh_sdf sdf = {&node, 1};
     MAKE(model, vsh_model_read("box.obj", run, &model, error));
@@ -216,9 +212,6 @@ static vsh_result trace(const vsh_run *run, vsh_error *error) {
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
     MAKE(solids, vshi_solids_create(&sdf, NULL, 1, &solids, error));
     MAKE(triangles, vshi_triangles_create(&mesh, 1, run, &triangles, error));
-    TRY(vshi_trace_shadow(triangles, solids, POINTS, positions, normals, 0.01, &light, 8, run, values,
-                          error));
-    TRY(vshi_trace_ao(triangles, solids, POINTS, positions, normals, 0.01, 1.0, 8, run, values, error));
     return VSH_OK;
 }
 
@@ -494,7 +487,7 @@ const scenario scenarios[] = {
     {"a grid written", write_grid},
     {"points shaded", shade_points},
     {"a query with layers", ask},
-    {"rays traced", trace},
+    {"casters made for rays", make_casters},
     {"a lightmap", bake_lightmap},
     {"a volume written", bake_volume},
     {"a picture", draw},

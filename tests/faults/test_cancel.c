@@ -22,10 +22,10 @@ typedef struct watch {
 } watch;
 
 /* Stages that scenarios have. */
-static const char *const stages_known[] = {"ao",    "bake",      "charts", "compare", "field",      "flat",
-                                           "hash",  "lit",       "load",   "outline", "pack",       "padding",
-                                           "page",  "query",     "render", "seams",   "shadow.sun", "surface",
-                                           "trace", "triangles", "unwrap", "volume",  "voxelize"};
+static const char *const stages_known[] = {
+    "ao",         "bake",    "charts",    "compare", "field",  "flat",    "hash",   "lit",
+    "load",       "outline", "pack",      "padding", "page",   "query",   "render", "seams",
+    "shadow.sun", "surface", "triangles", "unwrap",  "volume", "voxelize"};
 enum { STAGES_KNOWN = sizeof stages_known / sizeof stages_known[0] };
 static bool stages_seen[STAGES_KNOWN];
 

@@ -75,15 +75,25 @@ static void sdf(fuzz_input *input) {
     FUZZ_MAKE(solids, vshi_solids_create(&tree, transform, 1, &solids, fuzz_error()));
     if (solids != NULL) {
         double position[3] = {1, 1, 1}, lift = 0.01;
-        float normal[3] = {0, 1, 0}, value;
+        float normal[3] = {0, 1, 0};
         fuzz_take(input, position, sizeof position);
         fuzz_take(input, normal, sizeof normal);
         fuzz_take(input, &lift, sizeof lift);
         const vsh_light light = fuzz_take_light(input);
-        int32_t rays = 4;
-        fuzz_take(input, &rays, sizeof rays);
-        fuzz_check_plain(vshi_trace_shadow(NULL, solids, 1, position, normal, lift, &light, rays, &run,
-                                           &value, fuzz_error()));
+        if (lift >= 0.0 && fuzz_check_plain(vsh_light_check(&light, fuzz_error())) == VSH_OK) {
+            vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, 4, 0);
+            const vshi_truth truth = {.solids = solids,
+                                      .light = &light,
+                                      .place = vshi_light_in_world(&light),
+                                      .lift = lift,
+                                      .sampler = sampler,
+                                      .rays = 4};
+            int32_t free_rays[2], even;
+            if (sampler != NULL) {
+                vshi_truth_count(&truth, position, normal, NULL, 0, free_rays, &even);
+            }
+            vshi_sampler_free(sampler);
+        }
         vshi_solids_distance(solids, position);
     }
     vshi_solids_free(solids);

@@ -2,6 +2,7 @@
  * made of. */
 
 #include "geometry/alpha_mask.h"
+#include "rays.h"
 #include "shading.h"
 #include "testing.h"
 #include "trace/embree.h"
@@ -159,10 +160,11 @@ TEST(soft_shadows_and_ao_are_those_of_the_disc_as_triangles) {
     const vshi_triangles *all[3] = {cut, disc, square};
     for (int ao = 0; ao < 2; ++ao) {
         for (int k = 0; k < 3; ++k) {
-            assert_ok(ao ? vshi_trace_ao(all[k], NULL, POINTS, positions, normals, 0.0, 3.0, RAYS, NULL,
-                                         value[k], NULL)
-                         : vshi_trace_shadow(all[k], NULL, POINTS, positions, normals, 0.0, &light, RAYS,
-                                             NULL, value[k], NULL));
+            if (ao) {
+                see_sky(all[k], NULL, POINTS, positions, normals, 0.0, 3.0, RAYS, value[k]);
+            } else {
+                see_light(all[k], NULL, POINTS, positions, normals, 0.0, &light, RAYS, value[k]);
+            }
         }
         assert_at_most(truth_compare(POINTS, value[0], value[1], NULL).max,
                        3.0 / RAYS); /* rays on the very edge */

@@ -1,4 +1,5 @@
 /* Bakes that name no method keep the error asked for, whatever the voxels. */
+#include "rays.h"
 #include "shapes.h"
 #include "traced.h"
 #include "truth/metrics.h"
@@ -38,8 +39,7 @@ static vsh_shade_stats shade(const vsh_occluders *casters, const vsh_points *poi
 static double rmse_to_truth(const casting *c, const vsh_points *points) {
     const vsh_shade_options options = vsh_shade_options_default();
     const vsh_light light = sun(UP, RADIANS(6.0));
-    assert_ok(vshi_trace_shadow(c->triangles, NULL, COUNT, points->positions, points->normals, 1e-5, &light,
-                                4096, NULL, truth, &failure));
+    see_light(c->triangles, NULL, COUNT, points->positions, points->normals, 1e-5, &light, 4096, truth);
     shade(occluders_of_caster(c), points, &options, values);
     return truth_compare(COUNT, values, truth, NULL).rmse;
 }

@@ -1,4 +1,5 @@
 /* The error that a bake reports, the field's own share included, against rays to the casters. */
+#include "rays.h"
 #include "shading.h"
 #include "texels_of.h"
 #include "truth/metrics.h"
@@ -87,10 +88,8 @@ static void measure(const stage *s, const baked *b, double rmse[CHANNELS]) {
     OWNED(vsh_charts) *charts = charts_from(&s->floor.mesh, 1, &options);
     OWNED(texel_list) *texels = texels_from(charts);
     const texel_samples all = samples_of(texels);
-    assert_ok(vshi_trace_shadow(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, &light, RAYS,
-                                NULL, truth[0], &failure));
-    assert_ok(vshi_trace_ao(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, 1.0, RAYS, NULL,
-                            truth[1], &failure));
+    see_light(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, &light, RAYS, truth[0]);
+    see_sky(s->triangles, NULL, all.count, all.positions, all.normals, 1e-5, 1.0, RAYS, truth[1]);
     for (size_t i = 0; i < all.count; ++i) {
         const size_t place = vsh_texel_place(all.texels[i], WIDTH);
         values[0][i] = b->shadow[place];

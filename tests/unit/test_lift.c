@@ -3,6 +3,7 @@
 #include "casts.h"
 #include "lightmap/origins.h"
 #include "lightmap/texels.h"
+#include "rays.h"
 #include "shading.h"
 #include "testing.h"
 #include "texels_of.h"
@@ -125,8 +126,8 @@ TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
     lights[1].radius = 0.02;
     for (int l = 0; l < 2; ++l) {
         bake(&s, &lights[l], 1, &(vsh_lightmap){.shadow = planes});
-        assert_ok(vshi_trace_shadow(s.triangles, NULL, s.flat.count, s.flat.positions,
-                                    s.flat.geometric_normals, HAIR, &lights[l], 64, NULL, truth, &failure));
+        see_light(s.triangles, NULL, s.flat.count, s.flat.positions, s.flat.geometric_normals, HAIR,
+                  &lights[l], 64, truth);
         size_t hidden = 0, off = 0;
         for (size_t i = 0; i < s.flat.count; ++i) {
             double to[3];
@@ -229,8 +230,7 @@ TEST(ao_close_to_a_wall_is_that_of_the_facets) {
     FREED_BY(close_scene) scene s;
     open_beside_wall(&s, &wall, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
-    assert_ok(vshi_trace_ao(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1,
-                            256, NULL, truth, &failure));
+    see_sky(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1, 256, truth);
     size_t under = 0;
     for (size_t i = 0; i < s.flat.count; ++i) {
         if (FACE - s.flat.positions[3 * i] < 0.045) {

@@ -1,6 +1,7 @@
 /* The ends of every range that a scene has, by every method: voxels, places, bands, AO distances, steps,
  * receivers, normals and lights. A value there is a closed form, or the one in the middle of the range, or
  * refused by name. docs/accuracy.md has the bounds. test_light.c has lights that are refused. */
+#include "rays.h"
 #include "testing.h"
 #include "traced.h"
 
@@ -524,8 +525,7 @@ TEST(exact_of_a_light_without_size_is_one_traced_ray) {
     const vsh_light lights[2] = {sun(truth_seeds_sun, 0.0), lamp(place, 0.0)};
     for (int l = 0; l < 2; ++l) {
         cast_shadows(&c, &lights[l], VSH_SHADOW_EXACT, COUNT, positions, normals, exact);
-        assert_ok(vshi_trace_shadow(c.triangles, NULL, COUNT, positions, normals, 1e-5, &lights[l], 1, NULL,
-                                    ray, &failure));
+        see_light(c.triangles, NULL, COUNT, positions, normals, 1e-5, &lights[l], 1, ray);
         size_t other = 0, dark = 0;
         for (size_t i = 0; i < COUNT; ++i) {
             assert_true(exact[i] == 0.0f || exact[i] == 1.0f);

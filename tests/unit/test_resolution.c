@@ -1,4 +1,5 @@
 /* Resolutions where the user gives none, and casters without voxels. */
+#include "rays.h"
 #include "scenes.h"
 #include "shading.h"
 #include "testing.h"
@@ -58,8 +59,7 @@ TEST(triangles_alone_give_shadows_within_the_error_of_the_truth) {
         vsh_shade_stats stats = vsh_shade_stats_zero();
         assert_ok(vsh_shade_shadow(made, &points, &light, &options, NULL, lit, NULL, &stats, &failure));
         assert_true(stats.samples == 0 && stats.marches == 0 && stats.rays > 0);
-        assert_ok(vshi_trace_shadow(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light,
-                                    4096, NULL, truth, &failure));
+        see_light(parts.triangles, NULL, POINTS, positions[0], normals[0], 1e-6, &light, 4096, truth);
         assert_true(error_of(lit, truth) < options.max_error);
     }
 }
@@ -132,8 +132,7 @@ static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]
     OWNED(vshi_triangles) *triangles = NULL;
     vshi_solids *solids = NULL;
     assert_ok(vshi_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
-    assert_ok(vshi_trace_shadow(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0],
-                                1024, NULL, truth, &failure));
+    see_light(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0], 1024, truth);
     return info.field_bytes;
 }
 

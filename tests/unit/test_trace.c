@@ -1,5 +1,6 @@
 /* Rays against triangles and against procedural solids: closed forms, the same scene elsewhere and in another
  * size, bad input. */
+#include "rays.h"
 #include "shading.h"
 #include "testing.h"
 
@@ -34,18 +35,24 @@ static casters casters_of_tree(const vsh_sdf_node *nodes, size_t count, const do
     return c;
 }
 
+/* Of a light; normal NULL: towards it. */
 static double seen(casters c, const double *position, const float *normal, const vsh_light *light,
                    int32_t rays) {
-    float value = -1.0f;
-    assert_ok(vshi_trace_shadow(c.triangles, c.solids, 1, position, normal, 0.0, light, rays, NULL, &value,
-                                &failure));
+    float value = -1.0f, up[3];
+    if (normal == NULL) {
+        vshi_vec to;
+        const vshi_light_place place = vshi_light_in_world(light);
+        vshi_light_towards(&place, vshi_vec_of(position), &to);
+        memcpy(up, (const float[]){(float)to.x, (float)to.y, (float)to.z}, sizeof up);
+        normal = up;
+    }
+    see_light(c.triangles, c.solids, 1, position, normal, 0.0, light, rays, &value);
     return (double)value;
 }
 
 static double open_at(casters c, const double *position, double distance, int32_t rays) {
     float value = -1.0f;
-    assert_ok(
-        vshi_trace_ao(c.triangles, c.solids, 1, position, UP, 0.0, distance, rays, NULL, &value, &failure));
+    see_sky(c.triangles, c.solids, 1, position, UP, 0.0, distance, rays, &value);
     return (double)value;
 }
 
@@ -178,7 +185,7 @@ static casters seeds(void) {
 
 enum { SIZE = 64, COUNT = SIZE * SIZE };
 static double positions[3 * COUNT];
-static float normals[3 * COUNT], first[COUNT], other[COUNT];
+static float normals[3 * COUNT], first[COUNT];
 
 TEST(every_floor_texel_matches_analytic_rays) {
     enum { RAYS = 128 };
@@ -186,8 +193,7 @@ TEST(every_floor_texel_matches_analytic_rays) {
     floor_texels(SIZE, positions, normals);
     FREED_BY(free_casters) casters c = seeds();
     vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
-    assert_ok(vshi_trace_shadow(NULL, c.solids, COUNT, positions, normals, 0.0, &light, RAYS, NULL, first,
-                                &failure));
+    see_light(NULL, c.solids, COUNT, positions, normals, 0.0, &light, RAYS, first);
     truth_lights(truth_seeds(), COUNT, positions, NULL, truth_seeds_sun, truth_seeds_w, INFINITY, RAYS,
                  truth);
     int penumbra = 0, dark = 0;
@@ -377,23 +383,6 @@ TEST(trees_are_made_by_the_threads_that_were_given) {
     }
 }
 
-TEST(threads_change_no_bit) {
-    floor_texels(SIZE, positions, normals);
-    FREED_BY(free_casters) casters mesh = casters_of_ball(0.3, 1.2, 0.1), solids = seeds();
-    const vsh_light light = lamp((const double[]){0.0, 4.0, 0.0}, 0.7);
-    for (int ao = 0; ao < 2; ++ao) {
-        for (int32_t threads = 1; threads <= 5; threads += 2) {
-            const vsh_run run = run_on(threads);
-            float *values = threads == 1 ? first : other;
-            assert_ok(ao ? vshi_trace_ao(NULL, solids.solids, COUNT, positions, normals, 0.0, 0.6, 16, &run,
-                                         values, &failure)
-                         : vshi_trace_shadow(mesh.triangles, NULL, COUNT, positions, normals, 0.001, &light,
-                                             13, &run, values, &failure));
-            assert_true(threads == 1 || memcmp(first, other, sizeof first) == 0);
-        }
-    }
-}
-
 TEST(packets_change_no_bit) {
     enum { RAYS = 100 };
     FREED_BY(free_casters) casters c = casters_of_ball(0.3, 1.2, 0.1);
@@ -433,7 +422,7 @@ TEST(points_that_are_no_points_are_nan_and_no_casters_hide_nothing) {
     free_casters(&none[1]);
 }
 
-TEST(bad_triangles_and_calls_are_refused) {
+TEST(bad_triangles_are_refused) {
     const vsh_mesh mesh = ball(0.0, 0.0, 0.0);
     vshi_triangles *triangles = NULL;
     const vsh_run small = run_within(1 << 20);
@@ -443,26 +432,6 @@ TEST(bad_triangles_and_calls_are_refused) {
     const vsh_mesh bad = mesh_of_arrays(NULL, corners, NULL, 3, wrong, 1);
     assert_fails(vshi_triangles_create(&bad, 1, NULL, &triangles, &failure), VSH_ERROR_INPUT, "");
     assert_null(triangles);
-
-    FREED_BY(free_casters) casters c = casters_of_mesh(&mesh, 1);
-    float value = 0.0f;
-    const struct {
-        const float *normal;
-        double lift, distance;
-        int32_t rays;
-    } cases[] = {{UP, -1.0, 1.0, 4},    {UP, NAN, 1.0, 4}, {UP, 0.0, 1.0, 0},
-                 {UP, 0.0, 1.0, 65537}, {UP, 0.0, 0.0, 4}, {NULL, 0.0, 1.0, 4}};
-    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
-        assert_fails(vshi_trace_ao(c.triangles, NULL, 1, ORIGIN, cases[i].normal, cases[i].lift,
-                                   cases[i].distance, cases[i].rays, NULL, &value, &failure),
-                     VSH_ERROR_ARGUMENT, "");
-    }
-    vsh_light light = vsh_light_default();
-    assert_fails(vshi_trace_shadow(NULL, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &failure),
-                 VSH_ERROR_ARGUMENT, "solids");
-    light.angle = -1.0;
-    assert_fails(vshi_trace_shadow(c.triangles, NULL, 1, ORIGIN, UP, 0.0, &light, 4, NULL, &value, &failure),
-                 VSH_ERROR_ARGUMENT, "");
 }
 
 TEST(bad_solids_are_refused) {
