@@ -182,11 +182,19 @@ static void bake_all(baking *b, const vsh_run *run, vsh_bake_stats *stats) {
 
 static void write_image(vshi_channels *channels, const vsh_receiver *receiver) {
     vsh_error error;
-    float *memory;
-    const float *planes[VSH_MAX_CHANNELS];
-    bench_check(vshi_channels_allocate_rows(channels, receiver->height, &memory, &error), &error);
-    vshi_channels_rows(channels, 0, receiver->height, memory, planes);
     vsh_image image = channels->image;
+    const size_t texels = (size_t)image.width * (size_t)image.height;
+    float *memory = bench_take((size_t)image.channel_count * texels * sizeof *memory);
+    const float *planes[VSH_MAX_CHANNELS];
+    size_t plane = 0;
+    for (size_t i = 0; i < channels->value_count; ++i) {
+        for (size_t c = 0; c < channels->components[i]; ++c, ++plane) {
+            for (size_t t = 0; t < texels; ++t) {
+                memory[plane * texels + t] = channels->values[i][channels->components[i] * t + c];
+            }
+            planes[plane] = memory + plane * texels;
+        }
+    }
     image.planes = planes;
     const vsh_image_options how = vshi_receiver_image(receiver);
     bench_check(vsh_image_write(receiver->output, &image, &how, &error), &error);

@@ -133,7 +133,14 @@ static vsh_field *make_seeds_field(void) {
     bench_check(vsh_scene_casters(scene, assets, &run, &grid, &error), &error);
     vshi_field_options options = vshi_field_options_default();
     const double low[3] = {-2.5, 0.0, -2.5}, high[3] = {2.5, 0.0, 2.5};
-    options.reach = vshi_scene_reach(scene, grid, low, high);
+    vsh_grid_info info;
+    vsh_grid_get_info(grid, &info);
+    double square = 0.0;
+    for (int k = 0; k < 3; ++k) {
+        const double side = fmax(info.bounds_max[k], high[k]) - fmin(info.bounds_min[k], low[k]);
+        square += side * side;
+    }
+    options.reach = truth_seeds_w * sqrt(square); /* the sun's cone across the scene */
     bench_check(vshi_field_create(grid, &options, &run, &field, &error), &error);
     vsh_grid_free(grid);
     vsh_assets_free(assets);

@@ -18,8 +18,8 @@
 #include <vdbshade/occluders.h>
 
 typedef struct vshi_field_options {
-    double reach;    /* largest distance from a surface that the field resolves, world units, finite, > 0:
-                      * vshi_scene_reach(). 0: four times the diagonal of the solid's box */
+    double reach;    /* largest distance from a surface that the field resolves, world units, finite. 0: four
+                      * times the diagonal of the solid's box */
     int32_t surface; /* nonzero: extract the surface of the finest level, if the library has Embree. Adaptive
                       * then traces its rays against it instead of marching. Values are as near to the
                       * casters, not the same. Pays from about two rays an active voxel on, and costs some 30

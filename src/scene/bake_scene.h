@@ -95,14 +95,6 @@ vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scen
 /* The planes that a scene's bake fills are not NULL here. They cannot be written to. */
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
 
-/* Allocates the memory of vshi_channels_rows() for so many rows, to be freed. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
-                                       vsh_error *error);
-
-/* Lists rows of all channels, planes[image.channel_count][rows][width]. */
-void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
-                        const float **planes);
-
 void vshi_channels_free(vshi_channels *channels); /* also zeroed ones */
 
 /* --- pages (bake_scene.c) */

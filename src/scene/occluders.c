@@ -233,14 +233,6 @@ static double find_reach(const vsh_scene *scene, const vsh_grid_info *info, cons
     return scene->ao ? fmax(reach, scene->shade.ao_distance) : reach;
 }
 
-double vshi_scene_reach(const vsh_scene *scene, const vsh_grid *grid, const double receivers_min[3],
-                        const double receivers_max[3]) {
-    VSHI_FLOATS;
-    vsh_grid_info info;
-    vsh_grid_get_info(grid, &info);
-    return find_reach(scene, &info, receivers_min, receivers_max);
-}
-
 /* --- warnings and notes about voxels */
 
 /* Smallest share of a mesh's area that is worth a warning: edges sharper than a voxel are lost everywhere. */

@@ -630,8 +630,9 @@ static vsh_result report_writing(const vsh_run *run, double fraction, vsh_error 
     return VSH_OK;
 }
 
-vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
-                                       vsh_error *error) {
+/* Allocates the memory of list_rows(), to be freed. */
+static vsh_result allocate_rows(const vshi_channels *channels, int32_t rows, float **memory,
+                                vsh_error *error) {
     const size_t texels = (size_t)channels->image.width * (size_t)rows;
     size_t floats = 0;
     for (size_t i = 0; i < channels->value_count; ++i) {
@@ -640,8 +641,9 @@ vsh_result vshi_channels_allocate_rows(const vshi_channels *channels, int32_t ro
     return vshi_allocate((void **)memory, texels, floats * sizeof(float), "rows of a lightmap", error);
 }
 
-void vshi_channels_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
-                        const float **planes) {
+/* Lists rows of all channels, planes[image.channel_count][rows][width]. */
+static void list_rows(const vshi_channels *channels, int32_t first, int32_t rows, float *memory,
+                      const float **planes) {
     const size_t width = (size_t)channels->image.width, texels = width * (size_t)rows;
     for (size_t i = 0; i < channels->value_count; ++i) {
         const size_t components = channels->components[i];
@@ -666,11 +668,11 @@ static vsh_result write_rows(const vshi_scene_page *page, vshi_image_writer *wri
     float *memory = NULL;
     vsh_result result;
     VSHI_TRY_DONE(report_writing(&page->bake->run, 0.0, error));
-    VSHI_TRY_DONE(vshi_channels_allocate_rows(&page->channels, ROWS, &memory, error));
+    VSHI_TRY_DONE(allocate_rows(&page->channels, ROWS, &memory, error));
     for (int32_t first = 0; first < height; first += ROWS) {
         const int32_t rows = height - first < ROWS ? height - first : ROWS;
         if (options->rows != NULL || writer != NULL) {
-            vshi_channels_rows(&page->channels, first, rows, memory, planes);
+            list_rows(&page->channels, first, rows, memory, planes);
         }
         if (options->rows != NULL) {
             VSHI_TRY_DONE(
