@@ -119,10 +119,10 @@ typedef struct tile_work {
 static void trace_plane(const baking *b, tile_work *w, size_t channel) {
     const bench_rays_task *task = &b->tasks[channel];
     vshi_origins *o = &w->origins;
-    const double lift = vshi_triangles_lift(task->triangles);
+    const double offset = vshi_triangles_offset(task->triangles);
     vshi_origins_lift(&b->lifters[channel], &w->samples, true, o);
     for (size_t k = 0; k < 3 * o->count; ++k) {
-        w->from[k] = o->start[k] + lift * (double)o->face[k];
+        w->from[k] = o->start[k] + offset * (double)o->face[k];
     }
     bench_rays_trace(task, (const uint32_t(*)[2])b->net, o->count, w->from, o->normal, o->face, o->texel,
                      w->values);

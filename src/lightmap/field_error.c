@@ -24,15 +24,15 @@ static const double UNIT = 0x1p-32;
 
 static vshi_truth truth_of(const vsh_occluders *occluders, const vsh_shade_options *shade) {
     const vsh_field *field = occluders->field;
-    static const double LIFT = 0x1p-18; /* share of the casters' size, without triangles */
+    static const double OFFSET = 0x1p-18; /* share of the casters' size, without triangles */
     double size = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
         size = fmax(size, field->world_max[axis] - field->world_min[axis]);
     }
     vshi_truth truth = {.triangles = occluders->true_triangles, .solids = occluders->true_solids};
-    truth.lift = shade->surface_offset + (truth.triangles != NULL && truth.solids == NULL
-                                              ? vshi_triangles_lift(truth.triangles)
-                                              : LIFT * size);
+    truth.offset = shade->surface_offset + (truth.triangles != NULL && truth.solids == NULL
+                                                ? vshi_triangles_offset(truth.triangles)
+                                                : OFFSET * size);
     return truth;
 }
 
@@ -54,7 +54,7 @@ static bool is_outside(const vshi_field_error *of, const double position[3], con
     }
     double at[3];
     for (int k = 0; k < 3; ++k) {
-        at[k] = position[k] + truth->lift * (double)normal[k];
+        at[k] = position[k] + truth->offset * (double)normal[k];
     }
     return where == VSHI_OUTSIDE && (truth->solids == NULL || vshi_solids_distance(truth->solids, at) > 0.0);
 }

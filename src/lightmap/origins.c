@@ -122,8 +122,8 @@ static bool is_solid_behind(const vshi_triangles *triangles, const vshi_segment_
  * Both sides of a card also lie in one plane, but have no solid between them. */
 static void drop_touching(const lifting *l, const vshi_triangles *triangles, size_t first, size_t last) {
     static const double ACROSS[2] = {0.7648, 0.6442}; /* along no axis, and no usual edge */
-    static const double NEAR = 0.25; /* share of the lift: 16 roundings of a float; a wider gap is a gap */
-    const double lift = vshi_triangles_lift(triangles), near = NEAR * lift;
+    static const double NEAR = 0.25; /* share of the offset: 16 roundings of a float; a wider gap is a gap */
+    const double offset = vshi_triangles_offset(triangles), near = NEAR * offset;
     vshi_segment_ray across[TOGETHER], back[TOGETHER];
     size_t of[TOGETHER], count = 0;
     bool crossed[TOGETHER], covered[TOGETHER];
@@ -134,9 +134,10 @@ static void drop_touching(const lifting *l, const vshi_triangles *triangles, siz
             vshi_vec u, v;
             vshi_frame(normal, &u, &v);
             const vshi_vec d = vshi_unit(vshi_add(vshi_scale(u, ACROSS[0]), vshi_scale(v, ACROSS[1])));
-            const vshi_vec p = vshi_add(foot, vshi_sub(vshi_scale(normal, lift), vshi_scale(d, 0.5 * lift)));
+            const vshi_vec p =
+                vshi_add(foot, vshi_sub(vshi_scale(normal, offset), vshi_scale(d, 0.5 * offset)));
             const vshi_vec q = vshi_add(foot, vshi_scale(normal, near));
-            across[count] = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, lift};
+            across[count] = (vshi_segment_ray){{p.x, p.y, p.z}, {d.x, d.y, d.z}, offset};
             back[count] = (vshi_segment_ray){{q.x, q.y, q.z}, {down.x, down.y, down.z}, 2.0 * near};
             of[count++] = i;
         }

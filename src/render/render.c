@@ -63,7 +63,7 @@ typedef struct rendering {
     vsh_query *query; /* of the occluders */
     vsh_run run;
     bool traces_shadow, traces_ao; /* rays against triangles, not marches through the field */
-    double lift;                   /* of points on surfaces, voxels */
+    double offset;                 /* of points on surfaces, voxels */
     vshi_lit *lit;                 /* NULL: none */
     fog fog;
     const vsh_picture *picture;
@@ -298,7 +298,7 @@ static void add_surface_hit(const rendering *r, hits *h, const vsh_surface *surf
                             double distance, uint32_t texel, seen *result) {
     const vshi_vec at = vshi_add(ray->origin, vshi_scale(ray->direction, distance));
     const vshi_vec n = find_normal(surface->field, at, vshi_scale(ray->direction, -1.0));
-    const vshi_vec point = vshi_add(at, vshi_scale(n, r->lift * surface->field->voxel_size));
+    const vshi_vec point = vshi_add(at, vshi_scale(n, r->offset * surface->field->voxel_size));
     add_point(h, &(vshi_lift_point){point, {0.0, 0.0, 0.0}, n, n}, point, surface->color, texel, result);
 }
 
@@ -684,7 +684,7 @@ static vsh_result render_picture(rendering *r, vsh_shade_stats *stats, vsh_error
 /* --- checks */
 
 /* Voxels. Triangles and casters without voxels lie about this far over the visible surface. */
-static const double LIFT = 0.5;
+static const double OFFSET = 0.5;
 
 static vsh_result check_colors(const char *name, const double color[3], double most, vsh_error *error) {
     for (int c = 0; c < 3; ++c) {
@@ -752,12 +752,12 @@ static vsh_result check_memory(const rendering *r, vsh_error *error) {
 }
 
 /* Whether light comes from occluders other than the visible fields. */
-static bool needs_lift(const rendering *r) {
-    bool lift = (r->light_count > 0 && r->traces_shadow) || (r->options->ao && r->traces_ao);
-    for (size_t i = 0; i < r->occluders->layer_count && !lift; ++i) {
-        lift = r->occluders->layers[i].field == NULL;
+static bool needs_offset(const rendering *r) {
+    bool offset = (r->light_count > 0 && r->traces_shadow) || (r->options->ao && r->traces_ao);
+    for (size_t i = 0; i < r->occluders->layer_count && !offset; ++i) {
+        offset = r->occluders->layers[i].field == NULL;
     }
-    return lift;
+    return offset;
 }
 
 static vshi_sample_grid make_grid(const vsh_render_options *o) {
@@ -804,7 +804,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     VSHI_TRY_DONE(vshi_lit_create(&o, lights, light_count, &r.grid, &r.lit, error));
     r.traces_shadow = vshi_shadow_traces(&o.shade, occluders->triangles);
     r.traces_ao = vshi_ao_traces(&o.shade, occluders->triangles);
-    r.lift = needs_lift(&r) ? LIFT : 0.0;
+    r.offset = needs_offset(&r) ? OFFSET : 0.0;
     place_fog(&r);
     if (light_count > 0 && r.fog.extinction > 0.0) {
         r.fog.sampler = vshi_sampler_create(VSH_SAMPLER_BLUE, 1, o.shade.frame);

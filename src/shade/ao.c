@@ -31,7 +31,7 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
         return vshi_finite(frame->origin);
     }
     vshi_vec normal;
-    if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_lift(task->field, &task->options),
+    if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_offset(task->field, &task->options),
                            &frame->origin, &normal)) {
         task->ao[i] = NAN;
         if (task->bent != NULL) {

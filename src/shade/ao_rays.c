@@ -281,7 +281,7 @@ static bool prepare(const ray_piece *b, size_t i, point_rays *point, vsh_shade_s
     if (b->exact) {
         const vshi_vec normal =
             task->sphere ? point->frame.axes[2] : vshi_unit(vshi_vec_off(points->normals + 3 * i));
-        const double offset = vshi_triangles_lift(task->triangles) + task->options.surface_offset;
+        const double offset = vshi_triangles_offset(task->triangles) + task->options.surface_offset;
         const vshi_vec face = vshi_ao_face(task, i, normal);
         vshi_ao_axes(normal, point->world_axes);
         limit_dome(task, point, task->up, face, point->world_axes);

@@ -81,7 +81,7 @@ static inline double least(double a, double b) {
 
 /* The height of the cones' origins above the points, voxels. */
 static double below(const vshi_shadow_task *task) {
-    return vshi_shade_lift(task->field, &task->options);
+    return vshi_shade_offset(task->field, &task->options);
 }
 
 /* With one march a point: where a cone begins along its beam, and how far the cone goes while its beam goes

@@ -57,7 +57,7 @@ typedef struct solid_test {
     const vshi_triangles *triangles;
     const double *positions; /* [count][3] */
     const float *normals;
-    double lift;
+    double offset;
     bool holes; /* solids have holes: a ray that escapes proves nothing */
     vshi_open_fn *open;
     const void *user;
@@ -66,7 +66,7 @@ typedef struct solid_test {
 /* The origin of a point's rays. */
 static vshi_vec origin_of(const solid_test *l, size_t point) {
     const vshi_vec normal = vshi_unit(vshi_vec_off(l->normals + 3 * point));
-    return vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->lift));
+    return vshi_add(vshi_vec_of(l->positions + 3 * point), vshi_scale(normal, l->offset));
 }
 
 /* The origin of a point's rays, and axes for their directions. */
@@ -186,18 +186,18 @@ static void test_points(const solid_test *l, const size_t *points, size_t count,
 }
 
 /* Tests the points first … first + count - 1 again if they are inside and have a triangle closer than the
- * lift. */
+ * offset. */
 static void retest_nearer(const solid_test *l, size_t first, size_t count, uint8_t *where) {
     solid_test nearer = *l;
-    nearer.lift *= NEARER;
+    nearer.offset *= NEARER;
     vshi_segment_ray rays[AT_ONCE];
     size_t of[AT_ONCE], some = 0;
     bool blocked[AT_ONCE];
     for (size_t i = first; i < first + count; ++i) {
         if (where[i] != VSHI_OUTSIDE) {
             const vshi_vec normal = vshi_vec_off(l->normals + 3 * i);
-            const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * i), vshi_scale(normal, nearer.lift));
-            rays[some] = (vshi_segment_ray){{p.x, p.y, p.z}, {normal.x, normal.y, normal.z}, l->lift};
+            const vshi_vec p = vshi_add(vshi_vec_of(l->positions + 3 * i), vshi_scale(normal, nearer.offset));
+            rays[some] = (vshi_segment_ray){{p.x, p.y, p.z}, {normal.x, normal.y, normal.z}, l->offset};
             of[some++] = i;
         }
     }
@@ -300,7 +300,7 @@ void vshi_inside(const vshi_triangles *triangles, size_t count, const double *po
         return;
     }
     const solid_test l = {
-        triangles, positions, normals, vshi_triangles_lift(triangles), vshi_triangles_have_holes(triangles),
+        triangles, positions, normals, vshi_triangles_offset(triangles), vshi_triangles_have_holes(triangles),
         open,      user};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;

@@ -203,7 +203,7 @@ static void shade_closed(const prepared *item, const vshi_shadow_task *task, siz
     const size_t count = piece->points.count;
     if (layer->heights != NULL) {
         vshi_heights_shadow(layer->heights, &item->light, item->shadow.options.method, &piece->points, 0,
-                            count, vshi_heights_lift(layer->heights, layer->start_offset), piece->value,
+                            count, vshi_heights_offset(layer->heights, layer->start_offset), piece->value,
                             stats);
     } else {
         vshi_spheres_shadow(layer->spheres, &item->light, item->shadow.options.method, &piece->points, 0,

@@ -165,7 +165,7 @@ vsh_result vshi_shade_run(const vsh_run *run, const char *stage, size_t count, s
 
 /* --- where rays begin */
 
-bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
+bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double offset,
                        vshi_vec *origin, vshi_vec *normal) {
     *origin = vshi_to_field(field, points->positions + 3 * i);
     *normal = (vshi_vec){0.0, 0.0, 0.0};
@@ -174,7 +174,7 @@ bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t 
         if (!(vshi_dot(*normal, *normal) > 0.0)) {
             return false;
         }
-        *origin = vshi_add(*origin, vshi_scale(*normal, lift));
+        *origin = vshi_add(*origin, vshi_scale(*normal, offset));
     }
     return vshi_finite(*origin);
 }
@@ -193,7 +193,7 @@ bool vshi_shade_traces(const vsh_field *field, vshi_vec origin) {
            vshi_surface_clears(field, origin);
 }
 
-/* Rays to neighbours begin this far above the triangle, in units of vshi_triangles_lift(): more than the
+/* Rays to neighbours begin this far above the triangle, in units of vshi_triangles_offset(): more than the
  * rounding of floats. */
 static const double START = 0.125;
 
@@ -242,7 +242,7 @@ bool vshi_light_is_cut(const vshi_lifter *lifter, const vshi_lift_point *point) 
 /* Distance to the nearest triangle straight up and at 45 degrees to four sides, at most `far`. */
 static double find_room(const vshi_triangles *triangles, vshi_vec foot, vshi_vec normal, vshi_vec up,
                         double far) {
-    const vshi_vec from = vshi_add(foot, vshi_scale(normal, START * vshi_triangles_lift(triangles)));
+    const vshi_vec from = vshi_add(foot, vshi_scale(normal, START * vshi_triangles_offset(triangles)));
     vshi_vec u, v;
     vshi_frame(up, &u, &v);
     const vshi_vec ways[5] = {up, vshi_unit(vshi_add(up, u)), vshi_unit(vshi_sub(up, u)),

@@ -107,13 +107,14 @@ void vshi_shade_irradiance(const vsh_points *points, const float *shading_normal
 /* --- where rays begin */
 
 /* Height of the rays' origins above a point, voxels. */
-static inline double vshi_shade_lift(const vsh_field *field, const vsh_shade_options *options) {
+static inline double vshi_shade_offset(const vsh_field *field, const vsh_shade_options *options) {
     return options->start_offset + options->surface_offset / field->voxel_size;
 }
 
-/* Finds the origin of point i's rays, `lift` voxels above it, and its unit normal, both in field space. False
- * for a point that is not finite, or has no normal although normals are given (*normal is then zero). */
-bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double lift,
+/* Finds the origin of point i's rays, `offset` voxels above it, and its unit normal, both in field space.
+ * False for a point that is not finite, or has no normal although normals are given (*normal is then zero).
+ */
+bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t i, double offset,
                        vshi_vec *origin, vshi_vec *normal);
 
 /* The growth of casters for rays that begin at a point of field space, voxels: at most field->grown. */

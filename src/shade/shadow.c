@@ -51,13 +51,13 @@ static vshi_light_side aim(const vshi_shadow_task *task, size_t i, vshi_vec orig
 
 void vshi_shadow_gather(const vshi_shadow_task *task, size_t begin, size_t end, vshi_facing *facing,
                         vshi_chunk *chunk, vsh_shade_stats *stats) {
-    const double lift = vshi_shade_lift(task->field, &task->options);
+    const double offset = vshi_shade_offset(task->field, &task->options);
     facing->count = 0;
     for (size_t i = begin; i < end; ++i) {
         vshi_cone *cone = &facing->cone[facing->count];
         vshi_vec *normal = &facing->normal[facing->count];
         vshi_vec origin;
-        if (!vshi_shade_origin(task->field, task->points, i, lift, &origin, normal)) {
+        if (!vshi_shade_origin(task->field, task->points, i, offset, &origin, normal)) {
             vshi_shadow_settle(task, i, NAN, NAN);
             ++stats->invalid;
             continue;

@@ -46,7 +46,7 @@ static bool is_hard(const vshi_shadow_task *task) {
 
 /* Height of the origins of rays on triangles, as a share of the casters' size: above the rounding of floats,
  * below what is visible. */
-static const double TRACE_LIFT = 0x1p-18;
+static const double TRACE_OFFSET = 0x1p-18;
 
 /* The triangles that rays meet: the casters' in world space, or the field's surface in its own. */
 static const vshi_triangles *traced_of(const vshi_shadow_task *task) {
@@ -75,7 +75,7 @@ static void flush(ray_batch *batch) {
     }
 }
 
-/* Turns an open point to world space, off its surface by TRACE_LIFT. */
+/* Turns an open point to world space, off its surface by TRACE_OFFSET. */
 static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
     const double tangent = vshi_length(p->u);
     const double *at = task->points->positions + 3 * p->point;
@@ -84,12 +84,12 @@ static void turn_to_world(const vshi_shadow_task *task, open_point *p) {
         const double side = task->field->world_max[axis] - task->field->world_min[axis];
         size = side > size ? side : size;
     }
-    const double lift = TRACE_LIFT * size + task->options.surface_offset;
+    const double offset = TRACE_OFFSET * size + task->options.surface_offset;
     p->normal = vshi_direction_to_world(task->field, p->normal);
     p->axis = vshi_direction_to_world(task->field, p->axis);
     p->u = vshi_scale(vshi_direction_to_world(task->field, p->u), tangent);
     p->v = vshi_scale(vshi_direction_to_world(task->field, p->v), tangent);
-    p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, lift));
+    p->start = vshi_add(vshi_vec_of(at), vshi_scale(p->normal, offset));
     vshi_light_view view;
     p->end = vshi_light_look(&task->world, p->start, false, &view) == VSHI_LIGHT_SEEN ? view.end : 0.0;
 }

@@ -426,7 +426,7 @@ typedef enum stand {
 } stand;
 
 /* Places point i in cells. */
-static stand find_stand(const vshi_heights *heights, const vsh_points *points, size_t i, double lift,
+static stand find_stand(const vshi_heights *heights, const vsh_points *points, size_t i, double offset,
                         vshi_vec *at) {
     *at = vshi_transform_point(heights->to_cells, vshi_vec_of(points->positions + 3 * i));
     if (points->normals != NULL) {
@@ -435,7 +435,7 @@ static stand find_stand(const vshi_heights *heights, const vsh_points *points, s
         if (!(vshi_dot(normal, normal) > 0.5)) {
             return STAND_INVALID;
         }
-        *at = vshi_add(*at, vshi_scale(normal, lift / heights->unit));
+        *at = vshi_add(*at, vshi_scale(normal, offset / heights->unit));
     }
     if (!vshi_finite(*at)) {
         return STAND_INVALID;
@@ -452,7 +452,7 @@ static stand find_stand(const vshi_heights *heights, const vsh_points *points, s
     return STAND_FREE;
 }
 
-double vshi_heights_lift(const vshi_heights *heights, double start_offset) {
+double vshi_heights_offset(const vshi_heights *heights, double start_offset) {
     return start_offset > 0.0 ? start_offset * heights->unit : 0.0;
 }
 
@@ -494,7 +494,7 @@ static double march(const vshi_heights *heights, vshi_vec at, vshi_vec axis, dou
 }
 
 void vshi_heights_shadow(const vshi_heights *heights, const vsh_light *light, int32_t method,
-                         const vsh_points *points, size_t begin, size_t end, double lift, float *visibility,
+                         const vsh_points *points, size_t begin, size_t end, double offset, float *visibility,
                          vsh_shade_stats *stats) {
     const bool hard = method == VSH_SHADOW_HARD;
     vshi_light_place place = vshi_light_in_world(light);
@@ -507,7 +507,7 @@ void vshi_heights_shadow(const vshi_heights *heights, const vsh_light *light, in
         float *value = &visibility[i - begin];
         vshi_vec at;
         vshi_light_view view;
-        const stand where = find_stand(heights, points, i, lift, &at);
+        const stand where = find_stand(heights, points, i, offset, &at);
         if (where != STAND_FREE) {
             *value = where == STAND_BURIED ? 0.0f : NAN;
             continue;

@@ -36,13 +36,13 @@ void vshi_heights_get_info(const vshi_heights *heights, vshi_heights_info *info)
 
 /* Marches from points begin … end - 1 to a checked light, and writes its visible share to visibility[end -
  * begin]: 0 or 1 for VSH_SHADOW_HARD, the value of VSH_SHADOW_CLASSIC for any other method. Points first move
- * `lift` world units along their normals. Points in the solid are dark, invalid points NaN. Thread safe. */
+ * `offset` world units along their normals. Points in the solid are dark, invalid points NaN. Thread safe. */
 void vshi_heights_shadow(const vshi_heights *heights, const vsh_light *light, int32_t method,
-                         const vsh_points *points, size_t begin, size_t end, double lift, float *visibility,
+                         const vsh_points *points, size_t begin, size_t end, double offset, float *visibility,
                          vsh_shade_stats *stats);
 
 /* World units of a layer's start offset, which is in cells; -1 stands for 0. */
-double vshi_heights_lift(const vshi_heights *heights, double start_offset);
+double vshi_heights_offset(const vshi_heights *heights, double start_offset);
 
 /* Whether a world position is within the solid, deeper than receivers may be off. */
 bool vshi_heights_hold(const vshi_heights *heights, const double position[3]);

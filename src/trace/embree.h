@@ -129,4 +129,4 @@ bool vshi_triangles_have_vessels(const vshi_triangles *triangles);
 void vshi_triangles_bounds(const vshi_triangles *triangles, double low[3], double high[3]);
 
 /* Distance from surfaces at which rays begin, world units: above the rounding of floats, too small to see. */
-double vshi_triangles_lift(const vshi_triangles *triangles);
+double vshi_triangles_offset(const vshi_triangles *triangles);

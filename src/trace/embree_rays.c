@@ -6,7 +6,7 @@
 
 /* Share of the casters' size by which rays begin off a surface: 64 times a float's rounding of their
  * positions. */
-static const double LIFT = 0x1p-18;
+static const double OFFSET = 0x1p-18;
 
 static const double COHERENT = 0.9; /* least cosine between a packet's rays */
 
@@ -314,6 +314,6 @@ void vshi_triangles_bounds(const vshi_triangles *triangles, double low[3], doubl
     memcpy(high, triangles->high, sizeof triangles->high);
 }
 
-double vshi_triangles_lift(const vshi_triangles *triangles) {
-    return LIFT * triangles->size;
+double vshi_triangles_offset(const vshi_triangles *triangles) {
+    return OFFSET * triangles->size;
 }

@@ -121,7 +121,7 @@ static bool place_point(const vshi_truth *truth, const double position[3], const
                         const float *face, viewpoint *from, double *value) {
     const vshi_vec unit = vshi_unit(vshi_vec_off(normal)), up = face != NULL ? vshi_vec_off(face) : unit;
     *from =
-        (viewpoint){.origin = vshi_add(vshi_vec_of(position), vshi_scale(up, truth->lift)), .normal = unit};
+        (viewpoint){.origin = vshi_add(vshi_vec_of(position), vshi_scale(up, truth->offset)), .normal = unit};
     if (!(vshi_dot(unit, unit) > 0.5 && vshi_finite(from->origin))) {
         *value = NAN;
         return false;

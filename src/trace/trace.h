@@ -49,7 +49,7 @@ typedef struct vshi_truth {
     vshi_light_place place; /* of the light, in world space */
     double distance;        /* of AO */
     const vshi_vec *up;     /* of AO: over this horizon alone; NULL: none */
-    double lift;            /* of rays' origins along the normal, world units */
+    double offset;          /* of rays' origins along the normal, world units */
     const vshi_sampler *sampler;
     int32_t rays; /* most rays of each set of a point; the sampler has as many */
 } vshi_truth;

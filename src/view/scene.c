@@ -14,7 +14,7 @@
 enum { WIDTH = 2048, LIGHT_CHANNELS = 3 };
 
 /* Distance of shaded points from the surface, voxels: beyond the surface's own voxels. */
-static const double LIFT = 0.5;
+static const double OFFSET = 0.5;
 
 /* Even light of the sky for scenes without ambient light: with lights, and without any. */
 static const double DIM_SKY = 0.3, ONLY_SKY = 1.0;
@@ -56,7 +56,7 @@ static void add_vertices(surface *s, const part *p, size_t first) {
         const vshi_vec slope = vshi_vec_off(gradient);
         const vshi_vec normal = vshi_dot(slope, slope) > 0.0 ? vshi_direction_to_world(p->field, slope)
                                                              : (vshi_vec){0.0, 1.0, 0.0};
-        const vshi_vec point = vshi_add(world, vshi_scale(normal, LIFT * p->field->voxel_size));
+        const vshi_vec point = vshi_add(world, vshi_scale(normal, OFFSET * p->field->voxel_size));
         const double from[3][3] = {
             {world.x, world.y, world.z}, {normal.x, normal.y, normal.z}, {point.x, point.y, point.z}};
         for (size_t k = 0; k < 3; ++k) {

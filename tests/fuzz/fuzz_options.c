@@ -74,18 +74,18 @@ static void sdf(fuzz_input *input) {
     take_transform(input, transform);
     FUZZ_MAKE(solids, vshi_solids_create(&tree, transform, 1, &solids, fuzz_error()));
     if (solids != NULL) {
-        double position[3] = {1, 1, 1}, lift = 0.01;
+        double position[3] = {1, 1, 1}, offset = 0.01;
         float normal[3] = {0, 1, 0};
         fuzz_take(input, position, sizeof position);
         fuzz_take(input, normal, sizeof normal);
-        fuzz_take(input, &lift, sizeof lift);
+        fuzz_take(input, &offset, sizeof offset);
         const vsh_light light = fuzz_take_light(input);
-        if (lift >= 0.0 && fuzz_check_plain(vsh_light_check(&light, fuzz_error())) == VSH_OK) {
+        if (offset >= 0.0 && fuzz_check_plain(vsh_light_check(&light, fuzz_error())) == VSH_OK) {
             vshi_sampler *sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, 4, 0);
             const vshi_truth truth = {.solids = solids,
                                       .light = &light,
                                       .place = vshi_light_in_world(&light),
-                                      .lift = lift,
+                                      .offset = offset,
                                       .sampler = sampler,
                                       .rays = 4};
             int32_t free_rays[2], even;

@@ -21,22 +21,23 @@ static inline void see(vshi_truth truth, size_t count, const double *positions, 
     vshi_sampler_free(sampler);
 }
 
-/* The share of a light. Rays begin `lift` above the points. Triangles or solids may be NULL. */
+/* The share of a light. Rays begin `offset` above the points. Triangles or solids may be NULL. */
 static inline void see_light(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
-                             const double *positions, const float *normals, double lift,
+                             const double *positions, const float *normals, double offset,
                              const vsh_light *light, int32_t rays, float *seen) {
     const vshi_truth truth = {.triangles = triangles,
                               .solids = solids,
                               .light = light,
                               .place = vshi_light_in_world(light),
-                              .lift = lift};
+                              .offset = offset};
     see(truth, count, positions, normals, vshi_light_is_point(&truth.place) ? 1 : rays, seen);
 }
 
 /* The same of the sky within `distance`, weighted by the cosine. */
 static inline void see_sky(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
-                           const double *positions, const float *normals, double lift, double distance,
+                           const double *positions, const float *normals, double offset, double distance,
                            int32_t rays, float *seen) {
-    const vshi_truth truth = {.triangles = triangles, .solids = solids, .distance = distance, .lift = lift};
+    const vshi_truth truth = {
+        .triangles = triangles, .solids = solids, .distance = distance, .offset = offset};
     see(truth, count, positions, normals, rays, seen);
 }
