@@ -108,7 +108,7 @@ typedef enum vsh_shadow_method {
     VSH_SHADOW_CONE = 5,     /* inner and outer penumbra: the share of a disc behind an edge */
     VSH_SHADOW_RAYS = 6,     /* `rays` rays over the light's disc, marched through the field */
     VSH_SHADOW_ADAPTIVE = 7, /* cones that prove full light or shadow, else rays until max_error */
-    VSH_SHADOW_EXACT = 8,    /* the same, with rays against the casters' triangles */
+    VSH_SHADOW_EXACT = 8,    /* rays against triangles until max_error; voxels, if any, prove cones first */
     VSH_SHADOW_AUTO = 9      /* exact if the occluders have triangles, else adaptive */
 } vsh_shadow_method;
 
@@ -163,7 +163,8 @@ typedef struct vsh_shade_options {
                         and for AO of lightmaps whose texels share rays */
     int32_t frame;       /* ≥ 0 */
     int32_t early_rays;  /* for rays: if this many first rays agree, skip the rest; 0: never */
-    double max_error;    /* for adaptive and exact: root mean square error of the values, 1e-4 … 1 (0.02) */
+    double max_error;    /* for adaptive and exact: root mean square error of all values, 1e-4 … 1 (0.02);
+                            single values in a penumbra may be off by several times as much */
     double jitter;   /* shadows by one march, except improved: shorten steps by up to this share, 0 … 1, at
                         random for each texel, which turns bands into grain */
     double ao_up[3]; /* AO over this horizon only, any length: the free share of the directions with d · ao_up
@@ -251,22 +252,22 @@ static inline vsh_shade_stats vsh_shade_stats_zero(void) {
 /* Writes the fraction of the light that each point sees, 0 dark … 1 lit, to visibility[count]: before cosine,
  * colour and falloff (a spot's edge is falloff). Points that face away from the light, or lie beyond its
  * reach or cone, get 0, points inside it 1, invalid ones NaN. `shadow_error` [count] (may be NULL) receives
- * the standard error left: 0 if a cone proved the value, an estimate if rays gave it, NaN if the method knows
- * none. Uses up to 512 KB of each thread's stack, the caller's too. Errors (the arrays are then undefined):
- * VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run, and as vsh_light_check()),
- * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+ * the standard error left: 0 if a cone through voxels proved the value, an upper estimate if rays gave it,
+ * NaN if the method knows none. Uses up to 512 KB of each thread's stack, the caller's too. Errors (the
+ * arrays are then undefined): VSH_ERROR_ARGUMENT (options out of range, exact without triangles, run, and as
+ * vsh_light_check()), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *points,
                                     const vsh_light *light, const vsh_shade_options *options,
                                     const vsh_run *run, float *visibility, float *shadow_error,
                                     vsh_shade_stats *stats, vsh_error *error);
 
 /* Writes the cosine-weighted fraction of the hemisphere that is free within ao_distance, 0 … 1 open, to
- * ao[count]; NaN for invalid points. `ao_error` as above. `bent` [count][3] (may be NULL) receives bent
- * normals: the mean of the open directions, unit, world space; the normal if none is open, NaN for invalid
- * points (Landis, "Production-ready global illumination", 2002). Layers' directions are superposed, which is
- * exact if they hide different parts of the sky. Errors (the arrays are then undefined): VSH_ERROR_ARGUMENT
- * (options out of range, run, no normals; `bent` with VSH_AO_TAPS or a horizon), VSH_ERROR_MEMORY,
- * VSH_ERROR_CANCELLED. */
+ * ao[count]; NaN for invalid points. Occluders count fully up to that distance. `ao_error` as above. `bent`
+ * [count][3] (may be NULL) receives bent normals: the mean of the open directions, unit, world space; the
+ * normal if none is open, NaN for invalid points (Landis, "Production-ready global illumination", 2002).
+ * Layers' directions are superposed, which is exact if they hide different parts of the sky. Errors (the
+ * arrays are then undefined): VSH_ERROR_ARGUMENT (options out of range, run, no normals; `bent` with
+ * VSH_AO_TAPS or a horizon), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points,
                                 const vsh_shade_options *options, const vsh_run *run, float *ao,
                                 float *ao_error, float *bent, vsh_shade_stats *stats, vsh_error *error);

@@ -173,8 +173,9 @@ typedef struct vsh_lightmap_options {
      * farther off get the mean of a mip level, so that no level shows background */
     int32_t padding;
     vsh_shade_options shade; /* for bakes without options of their own */
-    int32_t ao_spacing; /* 1, 2, 4 or 8 texels. Above 1, texels share the rays of exact and adaptive AO. 1,
-                           and with supersampling: they do not */
+    int32_t ao_spacing; /* 1, 2, 4 or 8 texels. Above 1, texels share the rays of exact and adaptive AO. At 1,
+                           or with supersample above 1, each sample has rays of its own: slower, and not as
+                           smooth */
     int32_t tangents;   /* nonzero: keep what bent normals in tangent space need, 16 bytes a sample */
 } vsh_lightmap_options;
 
@@ -282,24 +283,24 @@ typedef struct vsh_bake_error {
     double values;       /* valid samples, if the channel's method knows an error; else 0 */
     double square_error; /* estimated squared error of their rays; of the sky before its factor (1 + n · up) /
                             2 */
-    double held;         /* values represented by the samples that were compared with the casters */
-    double held_square_error; /* measured squared error of these, from rays and voxels */
-    double worst;             /* largest estimated error of a value */
+    double compared;     /* samples compared with the casters, each weighted by the values it stands for */
+    double compared_square_error; /* measured squared error of these, from rays and voxels */
+    double worst;                 /* largest estimated error of a value */
 } vsh_bake_error;
 
-/* The root mean square error: the estimate of the rays, or the measured one if it is larger. NaN without
- * values. */
+/* The root mean square error: the estimate of the rays, or the measured one if it is larger, so it is usually
+ * too large. NaN without values. */
 static inline double vsh_bake_error_rmse(const vsh_bake_error *error) {
     const double rays = error->square_error / error->values;
-    const double held = error->held > 0.0 ? error->held_square_error / error->held : 0.0;
-    return error->values > 0.0 ? sqrt(rays > held ? rays : held) : NAN;
+    const double compared = error->compared > 0.0 ? error->compared_square_error / error->compared : 0.0;
+    return error->values > 0.0 ? sqrt(rays > compared ? rays : compared) : NAN;
 }
 
 /* The part of the measured error that rays do not explain: that of the voxels. NaN if nothing was measured.
  */
 static inline double vsh_bake_error_field(const vsh_bake_error *error) {
-    const double more = error->held_square_error / error->held - error->square_error / error->values;
-    return error->values > 0.0 && error->held > 0.0 ? sqrt(more > 0.0 ? more : 0.0) : NAN;
+    const double more = error->compared_square_error / error->compared - error->square_error / error->values;
+    return error->values > 0.0 && error->compared > 0.0 ? sqrt(more > 0.0 ? more : 0.0) : NAN;
 }
 
 /* Counts and errors of a bake. */
@@ -337,7 +338,7 @@ VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_c
 
 /* --- seams: edges of charts that look different on their two sides */
 
-/* What becomes of seams. */
+/* Whether seams are fixed. */
 typedef enum vsh_seams {
     VSH_SEAMS_DEFAULT = 0, /* FIX for outputs that are assets (vsh_lit_is_output()), else KEEP */
     VSH_SEAMS_KEEP = 1,    /* keep the baked values */

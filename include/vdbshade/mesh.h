@@ -69,7 +69,7 @@ typedef struct vsh_mesh {
     const char *object_name; /* of the object that it belongs to; NULL: `name` */
     uint32_t object;         /* meshes with equal numbers are parts of one object; 0: an object of its own */
     vsh_solidity solidity;   /* for casting */
-    const struct vsh_checked_mesh *checked; /* cached checks of views from a scene's assets; else NULL */
+    const struct vsh_checked_mesh *checked; /* set by the library: leave it NULL */
     vsh_alpha_mode alpha;                   /* of its material */
     int32_t one_sided; /* nonzero: light on the backs of its faces passes, as with back-face culling. Methods
                           that march voxels ignore it */
@@ -78,10 +78,10 @@ typedef struct vsh_mesh {
                               that are not finite are opaque */
     const char *material_name; /* may be NULL */
     const uint16_t *indices16; /* instead of `indices`, which must then be NULL */
-    size_t
-        position_stride;  /* bytes between consecutive positions, normals and UVs, multiples of 4, at most */
-    size_t normal_stride; /* VSH_MAX_STRIDE; 0: tightly packed. Calls copy arrays with strides, and */
-    size_t uv_stride;     /* 16-bit indices, while they run; charts keep the copies. Not for vsh_render() */
+    /* Bytes from one position, normal or UV to the next: multiples of 4, at most VSH_MAX_STRIDE; 0: tight.
+     * Calls copy arrays with strides, and 16-bit indices, while they run; charts keep the copies. Not for
+     * vsh_render(). */
+    size_t position_stride, normal_stride, uv_stride;
 } vsh_mesh;
 
 /* Findings of vsh_mesh_check(). Vertices at equal positions count as one, so UV seams do not open edges. */

@@ -33,9 +33,9 @@ typedef struct vsh_occluders_options {
     int32_t triangles; /* nonzero: keep the triangles if the library has Embree. Then methods can be exact,
                           auto is exact, and bakes can measure their error. 0: voxels alone, about 100 bytes
                           less for each triangle */
-    vsh_grid_options grid; /* of the voxels. Without a resolution and a voxel size there are no voxels if
-                              triangles are kept: methods are auto or exact, and distances are unknown.
-                              Otherwise the resolution is 256 */
+    vsh_grid_options grid; /* of the voxels. If resolution and voxel_size are 0 and triangles are kept, there
+                              are no voxels: methods are auto or exact, and distances are unknown. If both
+                              are 0 without triangles, the resolution is 256 */
 } vsh_occluders_options;
 
 static inline vsh_occluders_options vsh_occluders_options_default(void) {

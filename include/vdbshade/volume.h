@@ -85,7 +85,7 @@ typedef enum vsh_inside {
 /* How voxels are shaded. */
 typedef struct vsh_volume_options {
     size_t struct_size;
-    vsh_inside inside; /* what becomes of voxels inside solids */
+    vsh_inside inside; /* how voxels inside solids are filled */
     int32_t ao; /* nonzero: AO within shade.ao_distance. In free space it is the open share of all directions
                    (the ambient light of a fog), by cones or rays over the sphere; not by VSH_AO_TAPS, nor
                    with layers of heights and spheres */

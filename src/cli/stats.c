@@ -78,8 +78,8 @@ static vsh_bake_error sum_errors(const cli_stats *stats, int kind) {
         }
         sum.values += stats->errors[i].values;
         sum.square_error += stats->errors[i].square_error;
-        sum.held += stats->errors[i].held;
-        sum.held_square_error += stats->errors[i].held_square_error;
+        sum.compared += stats->errors[i].compared;
+        sum.compared_square_error += stats->errors[i].compared_square_error;
         sum.worst = fmax(sum.worst, stats->errors[i].worst);
     }
     return sum;

@@ -33,7 +33,7 @@ static inline size_t vshi_mesh_object_size(const vsh_mesh *meshes, size_t first,
 }
 
 /* Checks a mesh as vsh_mesh_check() does. A function that gets meshes from a caller calls this first, or
- * makes a set of them (mesh/mesh_set.h). A mesh that is known to pass costs nothing. `index` is the mesh's
+ * makes a set of them (mesh_set.h). A mesh that is known to pass costs nothing. `index` is the mesh's
  * place in a list, for messages. */
 vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
 

@@ -1,6 +1,6 @@
 /* Finds solids: which sides of the triangles of some meshes are air.
  *
- * Meshes consist of components, pieces connected by their edges (mesh/edges.h). Each is one of four kinds.
+ * Meshes consist of components, pieces connected by their edges (edges.h). Each is one of four kinds.
  * All meshes of a scene are analysed together, because a room may lie in the walls of another mesh. The parts
  * of an object (vshi_wholes) count as one mesh. */
 #pragma once
@@ -45,7 +45,7 @@ typedef struct vshi_component {
     vshi_kind kind;
     bool inward;          /* its faces look at its inside */
     bool vessel;          /* a sheet that would be solid if its holes were closed: a cup, a house without a
-                             floor. Points that see only its inner sides are hidden (shade/inside.h) */
+                             floor. Points that see only its inner sides are hidden (shade/shade.h) */
     bool around_all;      /* a sheet, because as a solid it would bury everything else */
     uint32_t whole;       /* its number */
     size_t triangles;     /* with some area, duplicates included */

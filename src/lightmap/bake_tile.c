@@ -150,8 +150,8 @@ struct vshi_tracer {
     bool traces_shadow, traces_ao; /* rays against triangles begin on the receiver's triangles */
     vshi_shadow_task *shadow;      /* [light_count] */
     vshi_ao_task ao, sky;
-    bool shared; /* AO rays are shared if charts have a spacing */
-    bool held;   /* some samples are compared with the casters */
+    bool shared;   /* AO rays are shared if charts have a spacing */
+    bool compared; /* some samples are compared with the casters */
     int32_t threads, isa;
 };
 
@@ -208,7 +208,7 @@ static bool keeps_error(const vsh_shade_options *shade, bool of_light) {
     return (traits & VSH_METHOD_KEEPS_ERROR) != 0;
 }
 
-static vsh_result prepare(vshi_tracer *t, const vsh_lightmap *planes, bool held, vsh_error *error) {
+static vsh_result prepare(vshi_tracer *t, const vsh_lightmap *planes, bool compared, vsh_error *error) {
     const vsh_occluders *casters = t->occluders;
     VSHI_TRY(lift_layers(t, error));
     t->bakes_lights = (t->needs & VSHI_NEEDS_LIGHTS) != 0;
@@ -216,8 +216,8 @@ static vsh_result prepare(vshi_tracer *t, const vsh_lightmap *planes, bool held,
     t->traces_shadow = vshi_shadow_traces(&t->shade, casters->triangles);
     t->traces_ao = vshi_ao_traces(&t->shade, casters->triangles);
     t->shared = !t->layered_ao && keeps_error(&t->shade, false);
-    t->held =
-        held && (casters->true_triangles != NULL || casters->true_solids != NULL) &&
+    t->compared =
+        compared && (casters->true_triangles != NULL || casters->true_solids != NULL) &&
         casters->layer_count == 0 &&
         ((t->bakes_lights && keeps_error(&t->shade, true)) || (t->bakes_ao && keeps_error(&t->shade, false)));
     t->placement = vshi_placement_open(casters, &t->shade, t->bakes_lights, t->bakes_ao, t->isa);
@@ -234,7 +234,7 @@ static vsh_result prepare(vshi_tracer *t, const vsh_lightmap *planes, bool held,
 }
 
 vsh_result vshi_tracer_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
-                              const vsh_shade_options *shade, const vsh_lightmap *planes, bool held,
+                              const vsh_shade_options *shade, const vsh_lightmap *planes, bool compared,
                               const vsh_run *run, vshi_tracer **tracer, vsh_error *error) {
     vshi_tracer *t = NULL;
     *tracer = NULL;
@@ -246,7 +246,7 @@ vsh_result vshi_tracer_create(const vsh_occluders *occluders, const vsh_light *l
     t->needs = vshi_planes_need(planes);
     t->threads = run->threads;
     t->isa = run->isa;
-    const vsh_result result = prepare(t, planes, held, error);
+    const vsh_result result = prepare(t, planes, compared, error);
     if (result != VSH_OK) {
         vshi_tracer_free(t);
         return result;
@@ -275,7 +275,7 @@ bool vshi_tracer_shares(const vshi_tracer *tracer, int32_t spacing) {
 
 static vsh_result open_checking(const vshi_tracer *t, const vshi_page *page, vshi_field_error *c,
                                 vsh_error *error) {
-    if (!t->held) {
+    if (!t->compared) {
         return VSH_OK;
     }
     *c = vshi_field_error_open(t->occluders, &t->shade, page->charts->info.samples,
@@ -311,9 +311,9 @@ typedef struct work {
     float *position; /* [room][3]: from the page's centre */
     int32_t *rays;
     uint8_t *level;
-    vshi_held_sample *held; /* [held_count] */
-    size_t held_count;
-    vshi_held_texel *held_texels;
+    vshi_compared_sample *compared; /* [compared_count] */
+    size_t compared_count;
+    vshi_compared_texel *compared_texels;
 } work;
 
 typedef struct tracing {
@@ -341,15 +341,15 @@ static int32_t rows_of(const vsh_charts *charts) {
 
 double vshi_trace_bytes(const vsh_charts *charts, int32_t threads) {
     const double each = (double)vshi_sample_bytes(charts->tangents) + VSHI_ORIGIN_BYTES +
-                        12.0 * sizeof(float) + sizeof(vshi_held_sample) + sizeof(vshi_held_texel);
+                        12.0 * sizeof(float) + sizeof(vshi_compared_sample) + sizeof(vshi_compared_texel);
     const size_t tiles = vshi_charts_tiles(&charts->sorted), count = (size_t)vshi_parallel_most(threads);
     return (double)(count < tiles ? count : tiles) * (double)room_of(charts, rows_of(charts), true) * each +
            vshi_tile_bytes(&charts->sorted, threads);
 }
 
 static void free_work(work *w) {
-    free(w->held_texels);
-    free(w->held);
+    free(w->compared_texels);
+    free(w->compared);
     free(w->level);
     free(w->rays);
     free(w->position);
@@ -364,7 +364,8 @@ static void free_work(work *w) {
 static vsh_result allocate_work(const tracing *t, work *w, vsh_error *error) {
     const vsh_charts *charts = t->page->charts;
     const size_t room = room_of(charts, t->rows, t->shares);
-    const size_t held = t->checking.channels != NULL ? (room + t->checking.step - 1) / t->checking.step : 0;
+    const size_t compared =
+        t->checking.channels != NULL ? (room + t->checking.step - 1) / t->checking.step : 0;
     VSHI_TRY(vshi_samples_allocate(&w->samples, room, charts->tangents, error));
     VSHI_TRY(vshi_origins_allocate(&w->origins, room, error));
     const vshi_array arrays[] = {
@@ -374,8 +375,8 @@ static vsh_result allocate_work(const tracing *t, work *w, vsh_error *error) {
         VSHI_ARRAY(w->irradiance, 3 * room),
         VSHI_ARRAY(w->rays, room),
         VSHI_ARRAY(w->level, room),
-        VSHI_ARRAY(w->held, held),
-        VSHI_ARRAY(w->held_texels, held),
+        VSHI_ARRAY(w->compared, compared),
+        VSHI_ARRAY(w->compared_texels, compared),
         VSHI_ARRAY(w->position, t->shares ? 3 * room : 0),
     };
     return VSHI_ALLOCATE_ALL(arrays, "lightmap tile", error);
@@ -454,8 +455,8 @@ static void end_channel(const tracing *t, const work *w, const channel *c, size_
         c->sum->square_error += c->stats->square_error - c->square;
         c->sum->worst = fmax(c->sum->worst, c->stats->worst_error);
         if (t->checking.channels != NULL) {
-            vshi_field_error_add(&t->checking.channels[index], &w->samples, w->origins.position, w->held,
-                                 w->held_count, w->values, c->sum);
+            vshi_field_error_add(&t->checking.channels[index], &w->samples, w->origins.position, w->compared,
+                                 w->compared_count, w->values, c->sum);
         }
     }
     c->stats->worst_error = fmax(c->worst, c->stats->worst_error);
@@ -611,12 +612,13 @@ static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, vshi_
     if (t->checking.channels == NULL || !keeps) {
         return VSH_OK;
     }
-    vshi_held_texels *held = &shots->held[tile];
-    held->count = vshi_field_error_count(&t->checking.channels[index], &w->samples, w->held, w->held_count,
-                                         w->held_texels);
-    VSHI_TRY(vshi_allocate((void **)&held->list, held->count, sizeof *held->list, "lightmap tile", error));
-    if (held->count > 0) {
-        memcpy(held->list, w->held_texels, held->count * sizeof *held->list);
+    vshi_compared_texels *compared = &shots->compared[tile];
+    compared->count = vshi_field_error_count(&t->checking.channels[index], &w->samples, w->compared,
+                                             w->compared_count, w->compared_texels);
+    VSHI_TRY(vshi_allocate((void **)&compared->list, compared->count, sizeof *compared->list, "lightmap tile",
+                           error));
+    if (compared->count > 0) {
+        memcpy(compared->list, w->compared_texels, compared->count * sizeof *compared->list);
     }
     return VSH_OK;
 }
@@ -659,11 +661,11 @@ static void note_texels(const tracing *t, const work *w) {
 static vsh_result trace_samples(const tracing *t, work *w, size_t tile, vsh_error *error) {
     const vshi_tracer *tracer = t->tracer;
     const vsh_lightmap *planes = &t->page->lightmap;
-    w->held_count = 0;
+    w->compared_count = 0;
     if (t->checking.channels != NULL) {
         vshi_samples own = w->samples;
         own.count = w->own;
-        w->held_count = vshi_field_error_choose(&t->checking, &own, &w->origins, w->held);
+        w->compared_count = vshi_field_error_choose(&t->checking, &own, &w->origins, w->compared);
     }
     find_ball(w);
     if (planes->irradiance != NULL) {

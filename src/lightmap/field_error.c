@@ -75,7 +75,7 @@ static bool find_origin(const vshi_origins *origins, size_t sample, uint32_t *or
 }
 
 size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *samples,
-                               const vshi_origins *origins, vshi_held_sample *held) {
+                               const vshi_origins *origins, vshi_compared_sample *compared) {
     size_t count = 0;
     for (size_t first = 0; first < samples->count; first += of->step) {
         const size_t left = samples->count - first, size = left < of->step ? left : of->step;
@@ -86,7 +86,7 @@ size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *s
         uint32_t origin;
         if (find_origin(origins, i, &origin) &&
             (of->traced || is_outside(of, position, samples->geometric + 3 * i))) {
-            held[count++] = (vshi_held_sample){(uint32_t)i, origin, (uint32_t)size};
+            compared[count++] = (vshi_compared_sample){(uint32_t)i, origin, (uint32_t)size};
         }
     }
     return count;
@@ -133,49 +133,53 @@ static void place(const vshi_truth_channel *channel, const vshi_samples *samples
 }
 
 static void add(double weight, double square, vsh_bake_error *sum) {
-    sum->held += weight;
-    sum->held_square_error += rint(weight * square / UNIT) * UNIT;
+    sum->compared += weight;
+    sum->compared_square_error += rint(weight * square / UNIT) * UNIT;
 }
 
 void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
-                          const double *places, const vshi_held_sample *held, size_t count,
+                          const double *places, const vshi_compared_sample *compared, size_t count,
                           const float *values, vsh_bake_error *sum) {
     for (size_t k = 0; k < count; ++k) {
-        const size_t i = held[k].sample;
-        const double value = (double)values[held[k].origin];
+        const size_t i = compared[k].sample;
+        const double value = (double)values[compared[k].origin];
         const vsh_light *light = channel->truth.light;
         const float *face = light == NULL ? samples->geometric + 3 * i : NULL;
         double position[3], seen[2];
         if (light != NULL &&
-            !vshi_light_lights(&channel->truth.place, vshi_vec_of(places + 3 * (size_t)held[k].origin))) {
+            !vshi_light_lights(&channel->truth.place, vshi_vec_of(places + 3 * (size_t)compared[k].origin))) {
             continue; /* 0 without error */
         }
         place(channel, samples, i, position);
         if (!isnan(value) && vshi_truth_twice(&channel->truth, position, samples->normal + 3 * i, face,
                                               samples->texel[i], value, seen)) {
-            add(held[k].weight, (value - seen[0]) * (value - seen[1]), sum);
+            add(compared[k].weight, (value - seen[0]) * (value - seen[1]), sum);
         }
     }
 }
 
 size_t vshi_field_error_count(const vshi_truth_channel *channel, const vshi_samples *samples,
-                              const vshi_held_sample *held, size_t count, vshi_held_texel *texels) {
+                              const vshi_compared_sample *compared, size_t count,
+                              vshi_compared_texel *texels) {
     size_t counted = 0;
     for (size_t k = 0; k < count; ++k) {
-        const size_t i = held[k].sample;
+        const size_t i = compared[k].sample;
         double position[3];
         int32_t free[2], even;
         place(channel, samples, i, position);
         if (vshi_truth_count(&channel->truth, position, samples->normal + 3 * i, samples->geometric + 3 * i,
                              samples->texel[i], free, &even)) {
-            texels[counted++] = (vshi_held_texel){
-                samples->texel[i], held[k].weight, {(uint16_t)free[0], (uint16_t)free[1]}, (int16_t)even, 0};
+            texels[counted++] = (vshi_compared_texel){samples->texel[i],
+                                                      compared[k].weight,
+                                                      {(uint16_t)free[0], (uint16_t)free[1]},
+                                                      (int16_t)even,
+                                                      0};
         }
     }
     return counted;
 }
 
-void vshi_field_error_settle(const vshi_held_texel *texel, double max_error, float value,
+void vshi_field_error_settle(const vshi_compared_texel *texel, double max_error, float value,
                              vsh_bake_error *sum) {
     const int32_t free[2] = {texel->free[0], texel->free[1]};
     double seen[2];

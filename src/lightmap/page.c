@@ -60,7 +60,7 @@ static vsh_result allocate_shots(vshi_page *page, vshi_shots *shots, bool open, 
         VSHI_ARRAY(shots->rays, texels),
         VSHI_ARRAY(shots->level, texels),
         VSHI_ARRAY(shots->open, open ? 3 * texels : 0),
-        VSHI_ARRAY(shots->held, vshi_charts_tiles(&page->charts->sorted)),
+        VSHI_ARRAY(shots->compared, vshi_charts_tiles(&page->charts->sorted)),
     };
     return allocate_stored(page->store, arrays, sizeof arrays / sizeof *arrays, "AO texels", error);
 }
@@ -119,10 +119,10 @@ double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes,
 }
 
 static void free_shots(vshi_page *page, vshi_shots *shots) {
-    for (size_t i = 0; shots->held != NULL && i < vshi_charts_tiles(&page->charts->sorted); ++i) {
-        free(shots->held[i].list);
+    for (size_t i = 0; shots->compared != NULL && i < vshi_charts_tiles(&page->charts->sorted); ++i) {
+        free(shots->compared[i].list);
     }
-    vshi_store_give(page->store, shots->held);
+    vshi_store_give(page->store, shots->compared);
     vshi_store_give(page->store, shots->open);
     vshi_store_give(page->store, shots->level);
     vshi_store_give(page->store, shots->rays);
@@ -178,8 +178,8 @@ vsh_result vshi_page_rasterize(vshi_page *page, size_t number, vsh_error *error)
 void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more) {
     sum->values += more->values;
     sum->square_error += more->square_error;
-    sum->held += more->held;
-    sum->held_square_error += more->held_square_error;
+    sum->compared += more->compared;
+    sum->compared_square_error += more->compared_square_error;
     sum->worst = fmax(sum->worst, more->worst);
 }
 
@@ -254,8 +254,8 @@ static vsh_result estimate(vshi_page *page, const vshi_shots *shots, size_t inde
         stats->errors[index].square_error += own.square_error;
         stats->errors[index].worst = fmax(stats->errors[index].worst, own.worst_error);
         for (size_t tile = 0; tile < vshi_charts_tiles(&page->charts->sorted); ++tile) {
-            const vshi_held_texels *held = &shots->held[tile];
-            for (const vshi_held_texel *t = held->list; t < held->list + held->count; ++t) {
+            const vshi_compared_texels *compared = &shots->compared[tile];
+            for (const vshi_compared_texel *t = compared->list; t < compared->list + compared->count; ++t) {
                 vshi_field_error_settle(t, page->shade.max_error, values[vshi_page_place(page, t->texel)],
                                         &stats->errors[index]);
             }

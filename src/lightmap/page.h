@@ -12,27 +12,27 @@
 /* --- pages (page.c) */
 
 /* Rays to the casters from a texel whose value is not known yet. */
-typedef struct vshi_held_texel {
+typedef struct vshi_compared_texel {
     uint32_t texel; /* vsh_texel() */
     uint32_t weight;
     uint16_t free[2]; /* free rays of each of two sets */
     int16_t even;     /* VSHI_TRUTH_… */
     int16_t zero;     /* padding: parts of bakes store the struct as it is */
-} vshi_held_texel;
+} vshi_compared_texel;
 
 /* Texels of a tile to compare with the casters once their values are known. */
-typedef struct vshi_held_texels {
-    vshi_held_texel *list; /* [count], or NULL */
+typedef struct vshi_compared_texels {
+    vshi_compared_texel *list; /* [count], or NULL */
     size_t count;
-} vshi_held_texels;
+} vshi_compared_texels;
 
 /* Results of the AO or sky rays that texels share. */
 typedef struct vshi_shots {
-    float *share;           /* [height][width]: free share of a texel's own rays; NULL: nothing is shared */
-    int32_t *rays;          /* [height][width] */
-    uint8_t *level;         /* [height][width]: vshi_ao_share's; 0: there is no valid texel */
-    float *open;            /* [height][width][3]: their bent, as in vshi_ao_task; NULL: not wanted */
-    vshi_held_texels *held; /* [tiles] */
+    float *share;   /* [height][width]: free share of a texel's own rays; NULL: nothing is shared */
+    int32_t *rays;  /* [height][width] */
+    uint8_t *level; /* [height][width]: vshi_ao_share's; 0: there is no valid texel */
+    float *open;    /* [height][width][3]: their bent, as in vshi_ao_task; NULL: not wanted */
+    vshi_compared_texels *compared; /* [tiles] */
 } vshi_shots;
 
 typedef struct vshi_page {
@@ -109,7 +109,7 @@ void vshi_bent_normal(const float *normal, const float *tangent, float *bent);
 /* Makes a mean of bent normals a unit vector. */
 void vshi_bent_normalize(float *bent);
 
-/* --- tracing tiles (trace.c) */
+/* --- tracing tiles (bake_tile.c) */
 
 /* Shared by all tiles of a bake. */
 typedef struct vshi_tracer vshi_tracer;
@@ -117,7 +117,7 @@ typedef struct vshi_tracer vshi_tracer;
 /* Prepares the shading of pages with these planes, of which only NULL or not counts, and their options. The
  * other arguments must outlive it. Errors: as vsh_bake_lightmap(). */
 vsh_result vshi_tracer_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
-                              const vsh_shade_options *shade, const vsh_lightmap *planes, bool held,
+                              const vsh_shade_options *shade, const vsh_lightmap *planes, bool compared,
                               const vsh_run *run, vshi_tracer **tracer, vsh_error *error);
 void vshi_tracer_free(vshi_tracer *tracer);
 
@@ -176,28 +176,29 @@ vsh_result vshi_truth_channel_open(const vshi_field_error *of, const vsh_light *
 void vshi_truth_channel_close(vshi_truth_channel *channel);
 
 /* A sample of a tile to compare with the casters. */
-typedef struct vshi_held_sample {
+typedef struct vshi_compared_sample {
     uint32_t sample, origin; /* its number among the samples, among the origins */
     uint32_t weight;         /* number of samples that it represents */
-} vshi_held_sample;
+} vshi_compared_sample;
 
-/* Chooses samples of a tile that are valid for the casters too; returns how many. `held` has room for one of
- * every `step`. */
+/* Chooses samples of a tile that are valid for the casters too; returns how many. `compared` has room for one
+ * of every `step`. */
 size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *samples,
-                               const vshi_origins *origins, vshi_held_sample *held);
+                               const vshi_origins *origins, vshi_compared_sample *compared);
 
 /* Adds the errors of a channel's values [origins], but for origins at `places` [origins][3] that the light
  * does not reach. */
 void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
-                          const double *places, const vshi_held_sample *held, size_t count,
+                          const double *places, const vshi_compared_sample *compared, size_t count,
                           const float *values, vsh_bake_error *sum);
 
 /* Counts the free rays of a channel; returns the number of texels. */
 size_t vshi_field_error_count(const vshi_truth_channel *channel, const vshi_samples *samples,
-                              const vshi_held_sample *held, size_t count, vshi_held_texel *texels);
+                              const vshi_compared_sample *compared, size_t count,
+                              vshi_compared_texel *texels);
 
 /* Adds the error of a texel, once its value is known. */
-void vshi_field_error_settle(const vshi_held_texel *texel, double max_error, float value,
+void vshi_field_error_settle(const vshi_compared_texel *texel, double max_error, float value,
                              vsh_bake_error *sum);
 
 /* The most rays behind each of a sample's two values. */

@@ -29,7 +29,7 @@ enum {
 };
 
 /* A kind of plane. To add one: its member of vsh_lightmap, its wish in vsh_planes, a row, and the code for
- * its values (bake/trace.c, bake/page.c). */
+ * its values (bake_tile.c, page.c). */
 typedef struct vshi_plane_kind {
     const char *name; /* name of its channel in files: "ao"; "shadow.NAME" if each light has one */
     const char

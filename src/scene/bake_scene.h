@@ -72,7 +72,7 @@ char *vshi_copy_folder(const char *path);
 /* --- channels (outputs.c) */
 
 typedef struct vshi_channels {
-    vsh_image image;       /* their names, in the order of bake/planes.c; A is the last. No planes */
+    vsh_image image;       /* their names, in the order of lightmap/planes.c; A is the last. No planes */
     vsh_lightmap lightmap; /* the values, as the bake takes them */
     char (*names)[VSH_CHANNEL_NAME];
     const char **name_list;

@@ -173,18 +173,20 @@ static vsh_result move_array(part_file *f, const vshi_scene_page *page, const pl
 }
 
 /* Moves a tile's texels to compare with the casters. The texels that it reads must lie in the tile. */
-static vsh_result move_held(part_file *f, const place *at, vshi_held_texels *held, vsh_error *error) {
-    uint64_t count = held->count;
+static vsh_result move_compared(part_file *f, const place *at, vshi_compared_texels *compared,
+                                vsh_error *error) {
+    uint64_t count = compared->count;
     VSHI_TRY(move_bytes(f, &count, sizeof count, error));
     if (count > VSHI_TILE * VSHI_TILE) {
         return fail_damaged(f->path, "its tiles", error);
     }
     if (f->reads) {
-        VSHI_TRY(vshi_allocate((void **)&held->list, (size_t)count, sizeof *held->list, f->path, error));
+        VSHI_TRY(
+            vshi_allocate((void **)&compared->list, (size_t)count, sizeof *compared->list, f->path, error));
     }
-    VSHI_TRY(move_bytes(f, held->list, (size_t)count * sizeof *held->list, error));
-    for (held->count = 0; held->count < count; ++held->count) {
-        const uint32_t texel = held->list[held->count].texel;
+    VSHI_TRY(move_bytes(f, compared->list, (size_t)count * sizeof *compared->list, error));
+    for (compared->count = 0; compared->count < count; ++compared->count) {
+        const uint32_t texel = compared->list[compared->count].texel;
         const size_t x = vsh_texel_column(texel), y = vsh_texel_row(texel);
         if (x < at->left || x >= at->left + at->columns || y < at->top || y >= at->top + at->rows) {
             return fail_damaged(f->path, "its tiles", error);
@@ -204,7 +206,7 @@ static vsh_result move_shots(part_file *f, const vshi_scene_page *page, const pl
     if (shots->open != NULL) {
         VSHI_TRY(move_array(f, page, at, shots->open, 3 * sizeof *shots->open, error));
     }
-    return move_held(f, at, &shots->held[tile], error);
+    return move_compared(f, at, &shots->compared[tile], error);
 }
 
 /* Reads or writes what vshi_trace_tiles() leaves of a tile. */

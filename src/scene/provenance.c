@@ -53,7 +53,7 @@ static vsh_result copy_path(file_list *inputs, const char *path, vsh_error *erro
     return path != NULL ? add_path(inputs, strdup(path), error) : VSH_OK;
 }
 
-/* Lists `files`, the files of casters, receivers and lights, then the files beside models (model/model.h),
+/* Lists `files`, the files of casters, receivers and lights, then the files beside models (io/model/model.h),
  * readable or not. `scene` may be NULL. Free the inputs also after an error. */
 static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, size_t file_count,
                               const vsh_run *run, vshi_job *job, file_list *inputs, vsh_error *error) {

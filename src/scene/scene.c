@@ -316,15 +316,13 @@ static const vshi_key ao_keys[] = {
 const vshi_table vshi_ao_table = VSHI_TABLE(ao_keys);
 
 static vsh_result read_ao(vshi_json *reader, const vshi_value *value, void *member) {
-    static const char *const whats[] = {
-        [VSH_AO_TAPS] = "ao by taps", [VSH_AO_RAYS] = "ao by rays", [VSH_AO_AUTO] = NULL};
     vsh_scene *scene = member;
     int32_t method = scene->shade.ao_method;
     VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
     VSHI_TRY(vshi_read_choice(reader, value, &(vshi_key){.name = "method", .names = VSH_NAMES_AO}, &method));
     scene->shade.ao_method = method;
-    const char *what = whats[method];
-    return vshi_read_object(reader, value, &vshi_ao_table, 1U << method, what != NULL ? what : "ao", scene);
+    const char *what = method == VSH_AO_TAPS ? "ao by taps" : method == VSH_AO_RAYS ? "ao by rays" : "ao";
+    return vshi_read_object(reader, value, &vshi_ao_table, 1U << method, what, scene);
 }
 
 /* "quadratic", or the powers of R, G and B. */

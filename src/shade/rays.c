@@ -5,7 +5,7 @@
 
 #include <math.h>
 
-/* Rays begin half a voxel on. The field is not known better, so h / t means nothing before. */
+/* Rays begin a sixteenth of a voxel on. The field is not known better, so h / t means nothing before. */
 static const double FIRST_STEP = 0.0625;
 /* Clipping cones shorter than this, voxels, costs more than it saves. */
 static const double SHORT = 32.0;

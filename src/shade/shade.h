@@ -125,7 +125,7 @@ double vshi_shade_grown(const vsh_field *field, vshi_vec origin);
 bool vshi_shade_traces(const vsh_field *field, vshi_vec origin);
 
 /* A point on a triangle, world space. Shadow rays begin on the triangle, or are lifted towards the smooth
- * surface that the vertex normals describe (mesh/mesh.h). Then the facets of a smooth mesh do not hide a
+ * surface that the vertex normals describe (geometry/mesh.h). Then the facets of a smooth mesh do not hide a
  * light above the smooth surface. AO needs no lift: it leaves out the directions below the face. */
 typedef struct vshi_lift_point {
     vshi_vec foot;         /* on the triangle */
@@ -179,8 +179,8 @@ typedef struct vshi_cone {
     double deeper;  /* of beams: see vshi_chunk; else 0 */
 } vshi_cone;
 
-/* Adds a cone if it can meet the casters' bounds. Otherwise returns false: its closeness then stays as it is.
- * An unknown field gets no cones. */
+/* Adds a cone if it can meet the casters' bounds, else returns false: the cone is free. If the field is
+ * unknown, returns true and adds nothing: the cone stays open. */
 bool vshi_chunk_add(vshi_chunk *chunk, const vsh_field *field, const vshi_cone *cone, uint32_t owner,
                     vsh_shade_stats *stats);
 

@@ -122,7 +122,7 @@ bool vshi_triangles_have_solids(const vshi_triangles *triangles);
 /* Whether any solid or wall has holes, by which rays go in and out. */
 bool vshi_triangles_have_holes(const vshi_triangles *triangles);
 
-/* Whether any sheet is a vessel (mesh/solidity.h). */
+/* Whether any sheet is a vessel (geometry/solidity.h). */
 bool vshi_triangles_have_vessels(const vshi_triangles *triangles);
 
 /* The box around all triangles, world space; low > high if there are none. */

@@ -13,7 +13,7 @@
 static const double CREASE = 0.64, SMOOTH = -0.6, PLANE = 0.9999995, QUAD = 0.9, SEAM = 0.985;
 
 double vshi_cut_mesh_bytes(const vsh_mesh *mesh) {
-    /* 170 a triangle, of which mesh/edges.c gives 130 back; then patches, trials and their equations */
+    /* 170 a triangle, of which geometry/edges.c gives 130 back; then patches, trials and their equations */
     return (170.0 + 420.0) * (double)mesh->triangle_count + 40.0 * (double)mesh->vertex_count;
 }
 

@@ -139,7 +139,7 @@ static void *run_all(void *unused) {
 TEST(every_scenario_runs_on_a_stack_of_a_mebibyte) {
     pthread_attr_t attributes;
     pthread_t thread;
-    if (VSHI_SANITIZED) { /* whose frames are larger */
+    if (VSHI_SANITIZED) { /* its frames are larger */
         skip();
     }
     assert_int_equal(pthread_attr_init(&attributes), 0);

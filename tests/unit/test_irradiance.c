@@ -461,7 +461,7 @@ TEST(texels_beyond_the_reach_cost_no_ray_and_do_not_dilute_the_error) {
             lit += d < light.reach;
         }
         assert_true(far ? lit == 0 : lit > 100);
-        assert_true(errors[0].values == (double)lit && errors[0].held <= (double)lit);
+        assert_true(errors[0].values == (double)lit && errors[0].compared <= (double)lit);
         assert_int_equal(stats.shade.skipped, FINE_TEXELS - lit);
         assert_true(far ? stats.shade.rays == 0 : stats.shade.rays > 0);
     }

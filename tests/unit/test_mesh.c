@@ -388,7 +388,7 @@ static void make_waves(waves *w) {
                           .uv_stride = sizeof(vertex)};
 }
 
-/* What is made of a mesh under a cube. */
+/* Everything that the library makes of a mesh under a cube. */
 typedef struct outcome {
     vsh_mesh_report report;
     vsh_solidity_report solidity[2];

@@ -35,7 +35,7 @@ static casters casters_of_tree(const vsh_sdf_node *nodes, size_t count, const do
     return c;
 }
 
-/* Of a light; normal NULL: towards it. */
+/* A point that sees a light; without a normal, it faces the light. */
 static double seen(casters c, const double *position, const float *normal, const vsh_light *light,
                    int32_t rays) {
     float value = -1.0f, up[3];

@@ -1,6 +1,6 @@
 /* An asset with its light, while vsh_lit_write() makes it. A glTF is kept whole while parts of it change: its
- * buffers stay as they are, and new bytes are added behind them. The functions of model/gltf.h read it, and
- * trust nothing in it. */
+ * buffers stay as they are, and new bytes are added behind them. The functions of io/model/gltf.h read it,
+ * and trust nothing in it. */
 #pragma once
 
 #include "base/file.h"

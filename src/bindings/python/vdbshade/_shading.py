@@ -458,10 +458,10 @@ def _error_of(error: Any) -> Tuple[float, float]:
     if not error.values > 0.0:
         return math.nan, math.nan
     rays = error.square_error / error.values
-    if not error.held > 0.0:
+    if not error.compared > 0.0:
         return math.sqrt(rays), math.nan
-    held = error.held_square_error / error.held
-    return math.sqrt(max(rays, held)), math.sqrt(max(held - rays, 0.0))
+    measured = error.compared_square_error / error.compared
+    return math.sqrt(max(rays, measured)), math.sqrt(max(measured - rays, 0.0))
 
 
 def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Sequence[Light]] = (), *, ao: bool = False,
