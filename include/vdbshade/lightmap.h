@@ -252,7 +252,8 @@ typedef struct vsh_planes {
 } vsh_planes;
 
 /* A lightmap in the caller's arrays. Planes are [height][width] with row 0 at v = 1. NULL planes are not
- * baked and cost nothing. Texels that neither a chart nor padding reaches are 0. */
+ * baked and cost nothing. Texels that neither a chart nor padding reaches are 0. A lightmap can be a part of
+ * larger images: planes then point at its first texel in them, and `row_texels` is their width. */
 typedef struct vsh_lightmap {
     float *const *shadow; /* [light_count] planes: visible fraction of each light; may be NULL */
     float *ao;            /* open fraction */
@@ -276,6 +277,8 @@ typedef struct vsh_lightmap {
                    (1 + n · up) / 2: floors 1, walls 1/2, ceilings 0. By shade.ao_method, which must be
                    rays, adaptive or exact, to (1 + n · up) / 2 × shade.max_error; of layers, those with
                    AO */
+    int32_t row_texels; /* from a row of each plane to the next, width … VSH_MAX_LIGHTMAP_SIZE; 0: the width.
+                           The bake needs room for a second copy of planes with wider rows */
 } vsh_lightmap;
 
 /* The error of a channel, as sums over its values, which can be added. Begins as zeros. */
@@ -327,8 +330,8 @@ static inline vsh_bake_stats vsh_bake_stats_zero(void) {
 /* Shades the charts' texels and fills the lightmap's planes. NULL options are those of vsh_charts_create().
  * Rays start start_offset + surface_offset above the surface (at least a voxel in creases), and on sheets
  * half the field's shell_thickness farther. Errors (the planes are then undefined):
- * - VSH_ERROR_ARGUMENT: occluders, charts or lightmap NULL, lights NULL with a count above 0, options out of
- *   range, run, and as vsh_light_check();
+ * - VSH_ERROR_ARGUMENT: occluders, charts or lightmap NULL, lights NULL with a count above 0, options or
+ *   row_texels out of range, run, and as vsh_light_check();
  * - VSH_ERROR_LIMIT: run->memory_limit, for occluders, charts and the bake;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_charts *charts,
@@ -384,7 +387,7 @@ typedef struct vsh_stitch_page {
  * max_change, and none leaves its range (0 … 1, irradiance ≥ 0). Shadow, AO, irradiance, tint and sky change;
  * errors, `invalid`, coverage and bent normals do not. Values that are not finite stay. Planes should have a
  * padding of 2 or more. `report` may be NULL. Errors (planes are unchanged unless cancelled):
- * - VSH_ERROR_ARGUMENT: charts or lightmap NULL, options out of range, run;
+ * - VSH_ERROR_ARGUMENT: charts or lightmap NULL, options or row_texels out of range, run;
  * - VSH_ERROR_LIMIT: run->memory_limit; 2^32 / 3 triangles; 2^32 places;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count, size_t light_count,
@@ -394,7 +397,7 @@ VSH_API vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t pag
 /* Fills hidden charts, such as faces that touch each other: texels without a valid texel in their chart get
  * the value of the nearest such border in the world. Also fills the empty texels around them, up to 4 or the
  * padding. Bent normals in tangent space stay. *filled (may be NULL) is the number of texels. Errors:
- * - VSH_ERROR_ARGUMENT: charts, lightmap or its coverage NULL; run;
+ * - VSH_ERROR_ARGUMENT: charts, lightmap or its coverage NULL; row_texels out of range; run;
  * - VSH_ERROR_LIMIT: run->memory_limit; 2^32 texels;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED (nothing has changed). */
 VSH_API vsh_result vsh_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap *lightmap,

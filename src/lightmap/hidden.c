@@ -64,7 +64,8 @@ static vsh_result read_tile(void *user, size_t number, vsh_error *error) {
             const size_t x = tile.cell.column * VSHI_CELL + bit % VSHI_CELL,
                          y = tile.cell.row * VSHI_CELL + bit / VSHI_CELL, at = y * h->width + x;
             if (owner != 0) {
-                h->state[at] = h->lightmap->coverage[at] != 0.0F ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
+                const size_t place = vshi_plane_place(h->lightmap, h->width, at);
+                h->state[at] = h->lightmap->coverage[place] != 0.0F ? VSHI_TEXEL_VALID : VSHI_TEXEL_INVALID;
                 h->mesh[at] = tile.triangle[owner - 1].mesh + 1;
             }
         }
@@ -197,7 +198,9 @@ static void find_sources(void *user, size_t begin, size_t end) {
     }
 }
 
-static void copy_value(const hiding *h, size_t from, size_t to) {
+static void copy_value(const hiding *h, size_t from_texel, size_t to_texel) {
+    const size_t from = vshi_plane_place(h->lightmap, h->width, from_texel),
+                 to = vshi_plane_place(h->lightmap, h->width, to_texel);
     for (vshi_plane_cursor c = {NULL}; vshi_plane_next(h->lightmap, h->light_count, &c);) {
         const size_t components = vshi_plane_components(c.kind);
         /* a direction in another chart's tangent space means nothing here */
@@ -322,6 +325,7 @@ vsh_result vsh_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap
     VSHI_NEEDS(charts);
     VSHI_NEEDS(lightmap);
     VSHI_NEEDS(lightmap->coverage);
+    VSHI_TRY(vshi_plane_row_check(lightmap, charts->info.width, error));
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vshi_store store = {.run = &full};

@@ -369,6 +369,7 @@ vsh_result vshi_lightmap_check(const vsh_lightmap *lightmap, const vsh_charts *c
                          "bent_space %d: expected %d, or %d with charts that have tangents",
                          lightmap->bent_space, VSH_BENT_WORLD, VSH_BENT_TANGENT);
     }
+    VSHI_TRY(vshi_plane_row_check(lightmap, charts->info.width, error));
     const int32_t up = lightmap->asked.sky;
     if (lightmap->sky != NULL && (up <= VSH_UP_NONE || up > VSH_UP_MINUS_Z)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap asked.sky %d: expected %d … %d", up, VSH_UP_X,
@@ -432,17 +433,26 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_charts *c
     for (size_t m = 0; sum.invalid_by_mesh != NULL && m < charts->sorted.mesh_count; ++m) {
         sum.invalid_by_mesh[m] = 0;
     }
+    const size_t width = (size_t)charts->info.width, height = (size_t)charts->info.height;
+    vsh_lightmap tight;
+    void *memory;
     vshi_tracer *tracer = NULL;
-    VSHI_TRY(vshi_tracer_create(occluders, lights, light_count, &shade, lightmap, sum.errors != NULL, &full,
-                                &tracer, error));
-    const size_t texels = (size_t)charts->info.width * (size_t)charts->info.height;
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(lightmap, light_count, &c);) {
-        memset(c.values, 0, texels * vshi_plane_components(c.kind) * sizeof *c.values);
+    vsh_result result;
+    VSHI_TRY(vshi_planes_tighten(lightmap, light_count, width, height, &full, &tight, &memory, error));
+    VSHI_TRY_DONE(vshi_tracer_create(occluders, lights, light_count, &shade, &tight, sum.errors != NULL,
+                                     &full, &tracer, error));
+    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(&tight, light_count, &c);) {
+        memset(c.values, 0, width * height * vshi_plane_components(c.kind) * sizeof *c.values);
     }
-    const vsh_result result = bake(tracer, charts, lightmap, light_count, &shade, &full, &sum, error);
-    vshi_tracer_free(tracer);
-    if (result == VSH_OK && stats != NULL) {
+    VSHI_TRY_DONE(bake(tracer, charts, &tight, light_count, &shade, &full, &sum, error));
+    if (memory != NULL) {
+        vshi_planes_copy_rows(&tight, lightmap, light_count, width, height);
+    }
+    if (stats != NULL) {
         memcpy(stats, &sum, stats->struct_size);
     }
+done:
+    vshi_tracer_free(tracer);
+    free(memory);
     return result;
 }

@@ -37,7 +37,7 @@ typedef struct vshi_shots {
 
 typedef struct vshi_page {
     const vsh_charts *charts;
-    vsh_lightmap lightmap; /* planes of the caller */
+    vsh_lightmap lightmap; /* its rows follow each other */
     size_t light_count;
     vsh_shade_options shade; /* resolved */
     vshi_store *store;

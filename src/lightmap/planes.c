@@ -1,6 +1,7 @@
-/* The table of planes, and the sky. */
+/* The table of planes, their rows, and the sky. */
 #include "lightmap/planes.h"
 
+#include "base/memory.h"
 #include "base/vec.h"
 
 #include <math.h>
@@ -93,4 +94,57 @@ int32_t vshi_planes_shaded(const vsh_planes *planes) {
         count += (kinds[k].needs & VSHI_NEEDS_OPEN) != 0 && vshi_plane_wished(&kinds[k], planes);
     }
     return count;
+}
+
+/* --- rows */
+
+vsh_result vshi_plane_row_check(const vsh_lightmap *lightmap, int32_t width, vsh_error *error) {
+    const int32_t row = lightmap->row_texels;
+    if (row != 0 && (row < width || row > VSH_MAX_LIGHTMAP_SIZE)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap row_texels %d: expected 0, or %d … %d", row,
+                         width, VSH_MAX_LIGHTMAP_SIZE);
+    }
+    return VSH_OK;
+}
+
+vsh_result vshi_planes_tighten(const vsh_lightmap *lightmap, size_t light_count, size_t width, size_t height,
+                               vsh_run *run, vsh_lightmap *tight, void **memory, vsh_error *error) {
+    static const char what[] = "copy of planes";
+    *memory = NULL;
+    *tight = *lightmap;
+    tight->row_texels = 0;
+    if (vshi_plane_row(lightmap, width) == width) {
+        return VSH_OK;
+    }
+    const size_t texels = width * height, lists = KINDS * (light_count + 1);
+    size_t floats = 0;
+    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(lightmap, light_count, &c);) {
+        floats += texels * vshi_plane_components(c.kind);
+    }
+    float *values, **list;
+    const vshi_array arrays[] = {VSHI_ARRAY(values, floats), VSHI_ARRAY(list, lists)};
+    const double bytes = (double)floats * sizeof *values + (double)lists * sizeof *list;
+    VSHI_TRY(vshi_check_limit(run, bytes, what, error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    *memory = values;
+    run->memory_held += (uint64_t)bytes;
+    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(lightmap, light_count, &c);) {
+        float **own = list + (size_t)(c.kind - kinds) * (light_count + 1);
+        own[c.light] = values;
+        vshi_plane_set(tight, c.kind, own);
+        values += texels * vshi_plane_components(c.kind);
+    }
+    return VSH_OK;
+}
+
+void vshi_planes_copy_rows(const vsh_lightmap *tight, const vsh_lightmap *lightmap, size_t light_count,
+                           size_t width, size_t height) {
+    vshi_plane_cursor from = {NULL}, to = {NULL};
+    while (vshi_plane_next(tight, light_count, &from) && vshi_plane_next(lightmap, light_count, &to)) {
+        const size_t components = vshi_plane_components(to.kind), row = components * width;
+        const size_t apart = components * vshi_plane_row(lightmap, width);
+        for (size_t y = 0; y < height; ++y) {
+            memcpy(to.values + y * apart, from.values + y * row, row * sizeof *to.values);
+        }
+    }
 }

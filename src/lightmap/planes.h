@@ -72,6 +72,34 @@ void vshi_plane_set(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *
 /* The needs, VSHI_NEEDS_…, of all planes. Only NULL or not counts: all lights have planes or none. */
 uint32_t vshi_planes_need(const vsh_lightmap *lightmap);
 
+/* --- rows */
+
+/* The texels from a row of the planes to the next. */
+static inline size_t vshi_plane_row(const vsh_lightmap *lightmap, size_t width) {
+    return lightmap->row_texels > 0 ? (size_t)lightmap->row_texels : width;
+}
+
+/* The place of texel y × width + x in the planes. */
+static inline size_t vshi_plane_place(const vsh_lightmap *lightmap, size_t width, size_t texel) {
+    const size_t row = vshi_plane_row(lightmap, width);
+    return row == width ? texel : texel / width * row + texel % width;
+}
+
+/* Checks row_texels. Errors: VSH_ERROR_ARGUMENT. */
+vsh_result vshi_plane_row_check(const vsh_lightmap *lightmap, int32_t width, vsh_error *error);
+
+/* Makes a lightmap whose rows follow each other: the given one, or one with planes of its own in *memory,
+ * which are added to run->memory_held. Free *memory with free(). Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY.
+ */
+vsh_result vshi_planes_tighten(const vsh_lightmap *lightmap, size_t light_count, size_t width, size_t height,
+                               vsh_run *run, vsh_lightmap *tight, void **memory, vsh_error *error);
+
+/* Copies the planes of `tight` to those of the lightmap, whose texels between rows stay. */
+void vshi_planes_copy_rows(const vsh_lightmap *tight, const vsh_lightmap *lightmap, size_t light_count,
+                           size_t width, size_t height);
+
+/* --- the sky */
+
 /* The axis of a sky, VSH_UP_…. */
 void vshi_sky_up(int32_t axis, double up[3]);
 

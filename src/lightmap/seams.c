@@ -22,7 +22,7 @@
  */
 typedef struct seam_system {
     size_t unknown_count;
-    uint64_t *texel; /* [unknown_count]: y × width + x in its page */
+    uint64_t *texel; /* [unknown_count]: y × width + x in its page; later its place in the planes */
     uint32_t *page;  /* [unknown_count] */
     uint32_t *chart; /* [unknown_count]: the chart that covers it; NO_CHART: none */
     size_t row_count;
@@ -721,6 +721,11 @@ static vsh_result stitch(stitching *s, size_t light_count, const vsh_run *run, v
     VSHI_TRY_DONE(
         vshi_seams_find(&pages, vshi_cos(s->options->max_angle * RADIANS), run, s->job, &seams, error));
     VSHI_TRY_DONE(make_system(&m, run, error));
+    for (size_t u = 0; u < system->unknown_count; ++u) {
+        const vsh_stitch_page *page = &s->pages[system->page[u]];
+        system->texel[u] =
+            vshi_plane_place(page->lightmap, (size_t)page->charts->info.width, system->texel[u]);
+    }
     report->seams = seams.count;
     report->places = system->row_count;
     report->crowded = system->crowded;
@@ -756,6 +761,7 @@ static vsh_result check_pages(stitching *s, size_t light_count, vsh_run *run, vs
         const vsh_stitch_page *given = &s->pages[page];
         VSHI_NEEDS(given->charts);
         VSHI_NEEDS(given->lightmap);
+        VSHI_TRY(vshi_plane_row_check(given->lightmap, given->charts->info.width, error));
         const size_t count = list_channels(given->lightmap, light_count, NULL, page);
         if (page > 0 && count != s->channel_count) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,

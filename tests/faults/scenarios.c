@@ -365,8 +365,11 @@ static vsh_result bake_lightmap(const vsh_run *run, vsh_error *error) {
     adaptive.method = VSH_SHADOW_ADAPTIVE;
     adaptive.ao_method = VSH_AO_ADAPTIVE;
     adaptive.rays = 16;
-    const vsh_lightmap some = {
-        .shadow = shadow, .ao = planes[4], .coverage = planes[6], .ao_error = planes[7]};
+    const vsh_lightmap some = {.shadow = shadow,
+                               .ao = planes[4],
+                               .coverage = planes[6],
+                               .ao_error = planes[7],
+                               .row_texels = 2 * SIDE};
     TRY(vsh_bake_lightmap(occluders, charts, lights, 2, &adaptive, run, &some, NULL, error));
     options.supersample = 2;
     MAKE(fine, vsh_charts_create(&mesh, 1, &options, run, NULL, &fine, error));

@@ -308,6 +308,172 @@ TEST(errors_are_baked_where_the_method_knows_them) {
     assert_all_equal(errors, TEXELS, 0.0f);
 }
 
+/* --- wide rows: a lightmap is a part of larger images */
+
+enum { WIDTH = 48, HEIGHT = 32, ROW = 61, LEFT = 7, TOP = 3, IMAGE = ROW * (HEIGHT + 2 * TOP) };
+enum { LIGHTS = 2, IMAGES = 13 };
+
+/* Shadow, its error and tint of each light; irradiance, bent, AO, its error, coverage, invalid, sky. */
+static const size_t image_components[IMAGES] = {1, 1, 1, 1, 3, 3, 3, 3, 1, 1, 1, 1, 1};
+
+typedef struct images {
+    float values[IMAGES][3 * IMAGE];
+    float *first[IMAGES]; /* texels of the lightmap */
+    vsh_lightmap lightmap;
+} images;
+
+static images *new_images(int32_t row_texels) {
+    images *m = malloc(sizeof *m);
+    memset(m, 0xff, sizeof *m); /* NaN */
+    for (int i = 0; i < IMAGES; ++i) {
+        m->first[i] = m->values[i] + (row_texels != 0 ? image_components[i] * (TOP * ROW + LEFT) : 0);
+    }
+    float **first = m->first;
+    m->lightmap = (vsh_lightmap){.shadow = first,
+                                 .shadow_error = first + 2,
+                                 .tint = first + 4,
+                                 .irradiance = first[6],
+                                 .bent = first[7],
+                                 .ao = first[8],
+                                 .ao_error = first[9],
+                                 .coverage = first[10],
+                                 .invalid = first[11],
+                                 .sky = first[12],
+                                 .tint_by = {.type = VSH_TINT_QUADRATIC},
+                                 .asked = {.invalid = 1, .sky = VSH_UP_Y},
+                                 .row_texels = row_texels};
+    return m;
+}
+
+static size_t count_of_nan(const float *values, size_t count) {
+    size_t found = 0;
+    for (size_t i = 0; i < count; ++i) {
+        found += isnan(values[i]) != 0;
+    }
+    return found;
+}
+
+/* Compares every row, and checks that all around the lightmap is as it was. */
+static void assert_part_equals(const images *part, const images *whole) {
+    for (int i = 0; i < IMAGES; ++i) {
+        const size_t n = image_components[i];
+        for (size_t y = 0; y < HEIGHT; ++y) {
+            assert_memory_equal(part->first[i] + y * ROW * n, whole->first[i] + y * WIDTH * n,
+                                WIDTH * n * sizeof(float));
+        }
+        assert_int_equal(count_of_nan(whole->values[i], WIDTH * HEIGHT * n), 0);
+        assert_int_equal(count_of_nan(part->values[i], IMAGE * n), (IMAGE - WIDTH * HEIGHT) * n);
+    }
+}
+
+/* The floor in three strips. The wall hides the middle one, and the seams on both sides of it. Rows of its
+ * texels are narrower, so that values differ across seams. */
+typedef struct strips {
+    vsh_field *field;
+    float corners[3][12], uvs[3][8];
+    vsh_mesh meshes[3];
+    vsh_charts *charts;
+    vsh_light lights[LIGHTS];
+} strips;
+
+static void make_strips(strips *s) {
+    static const float x[4] = {-1.0f, -0.14f, 0.14f, 1.0f};
+    static const float u[3][2] = {{0.05f, 0.4f}, {0.45f, 0.55f}, {0.6f, 0.95f}};
+    for (int i = 0; i < 3; ++i) {
+        const vsh_mesh floor = floor_mesh(NULL);
+        for (size_t k = 0; k < 4; ++k) {
+            const int right = QUAD_UVS[2 * k] > 0.5f;
+            memcpy(s->corners[i] + 3 * k, floor.positions + 3 * k, 3 * sizeof(float));
+            s->corners[i][3 * k] = x[i + right];
+            s->uvs[i][2 * k] = u[i][right];
+            s->uvs[i][2 * k + 1] = 0.1f + (i == 1 ? 0.7f : 0.8f) * QUAD_UVS[2 * k + 1];
+        }
+        s->meshes[i] = quad_mesh("strip", s->corners[i], s->uvs[i]);
+    }
+    vsh_lightmap_options options = size_of(WIDTH, HEIGHT, 1);
+    options.shade.method = VSH_SHADOW_ADAPTIVE;
+    options.shade.ao_method = VSH_AO_ADAPTIVE;
+    s->charts = charts_from(s->meshes, 3, &options);
+    s->field = floor_field(1);
+    s->lights[0] = sun(1.0, 1.0, 0.3, 0.3);
+    s->lights[1] = sun(-0.5, 1.0, 0.0, 0.1);
+}
+
+static void free_strips(strips *s) {
+    vsh_charts_free(s->charts);
+    vshi_field_free(s->field);
+}
+
+static vsh_result bake_strips(const strips *s, const vsh_lightmap *lightmap, const vsh_run *run,
+                              vsh_error *error) {
+    return vsh_bake_lightmap(occluders_of(s->field), s->charts, s->lights, LIGHTS, NULL, run, lightmap, NULL,
+                             error);
+}
+
+TEST(a_part_of_larger_images_gets_the_values_of_a_lightmap_alone) {
+    FREED_BY(free_strips) strips s;
+    make_strips(&s);
+    FREED images *whole = new_images(0), *part = new_images(ROW);
+    images *both[2] = {whole, part};
+    uint64_t filled[2];
+    vsh_stitch_report reports[2];
+    for (int k = 0; k < 2; ++k) {
+        assert_ok(bake_strips(&s, &both[k]->lightmap, NULL, &failure));
+    }
+    assert_part_equals(part, whole);
+    FREED images *baked = new_images(0);
+    memcpy(baked->values, whole->values, sizeof baked->values);
+    for (int k = 0; k < 2; ++k) {
+        assert_ok(vsh_lightmap_fill_hidden(s.charts, &both[k]->lightmap, LIGHTS, NULL, &filled[k], &failure));
+    }
+    assert_part_equals(part, whole);
+    assert_true(filled[0] > 0 && filled[1] == filled[0]);
+    assert_memory_not_equal(whole->values, baked->values, sizeof baked->values);
+    memcpy(baked->values, whole->values, sizeof baked->values);
+    for (int k = 0; k < 2; ++k) {
+        assert_ok(stitch_one(s.charts, &both[k]->lightmap, LIGHTS, NULL, NULL, &reports[k], &failure));
+    }
+    assert_part_equals(part, whole);
+    assert_true(reports[0].after < reports[0].before && reports[1].after == reports[0].after);
+    assert_memory_not_equal(whole->values, baked->values, sizeof baked->values);
+}
+
+static int32_t stop_at_once(void *user, const char *step, double fraction) {
+    return 1;
+}
+
+TEST(bad_rows_are_refused_and_calls_that_fail_leave_wide_rows) {
+    static const int32_t bad[] = {-1, 1, WIDTH - 1, VSH_MAX_LIGHTMAP_SIZE + 1};
+    FREED_BY(free_strips) strips s;
+    make_strips(&s);
+    FREED images *part = new_images(ROW);
+    vsh_lightmap *lightmap = &part->lightmap;
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
+        char expected[80];
+        snprintf(expected, sizeof expected, "row_texels %d: expected 0, or %d … %d", bad[i], WIDTH,
+                 VSH_MAX_LIGHTMAP_SIZE);
+        lightmap->row_texels = bad[i];
+        assert_fails(bake_strips(&s, lightmap, NULL, &failure), VSH_ERROR_ARGUMENT, expected);
+        assert_fails(vsh_lightmap_fill_hidden(s.charts, lightmap, LIGHTS, NULL, NULL, &failure),
+                     VSH_ERROR_ARGUMENT, expected);
+        assert_fails(stitch_one(s.charts, lightmap, LIGHTS, NULL, NULL, NULL, &failure), VSH_ERROR_ARGUMENT,
+                     expected);
+    }
+    lightmap->row_texels = ROW;
+    const vsh_run stopped = run_watched(stop_at_once, NULL);
+    assert_fails(bake_strips(&s, lightmap, &stopped, &failure), VSH_ERROR_CANCELLED, "");
+    /* the copy counts: the limit is raised until only it has no room, in steps smaller than it */
+    const uint64_t step = WIDTH * HEIGHT * IMAGES * sizeof(float);
+    uint64_t limit = step;
+    do {
+        const vsh_run limited = run_within(limit += step);
+        assert_fails(bake_strips(&s, lightmap, &limited, &failure), VSH_ERROR_LIMIT, "");
+    } while (strstr(failure.message, "copy of planes") == NULL);
+    for (int i = 0; i < IMAGES; ++i) {
+        assert_int_equal(count_of_nan(part->values[i], 3 * IMAGE), 3 * IMAGE);
+    }
+}
+
 /* --- padding: texels outside of charts take their nearest neighbour's value */
 
 static const float HOLE = -7.0f; /* the value of unfilled texels alone */

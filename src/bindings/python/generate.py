@@ -12,7 +12,7 @@ import textwrap
 import cffi
 
 # Members for the library's own use, or replaced by arguments of other names.
-HIDDEN = {"struct_size", "user", "checked", "done", "look"}
+HIDDEN = {"struct_size", "user", "checked", "done", "look", "row_texels"}
 # Members replaced by arguments of their own.
 ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, "vsh_compare_files_options": {"limits"},
              "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"},
