@@ -105,9 +105,9 @@ VSH_API vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_o
 /* Errors of values against the truth, over several planes together. Zeros if nothing is compared. */
 typedef struct vsh_accuracy {
     uint64_t count; /* values compared: masked in, finite in both */
-    double rmse;
-    double p99; /* of |value - truth|, nearest rank */
-    double max; /* largest |value - truth| */
+    double rmse;    /* root mean square of value - truth */
+    double p99;     /* of |value - truth|, nearest rank */
+    double max;     /* largest |value - truth| */
 } vsh_accuracy;
 
 /* Measures how far planes of values, 0 … 1, are from their truth, which is `golden`. Takes a byte a value

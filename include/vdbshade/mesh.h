@@ -78,10 +78,11 @@ typedef struct vsh_mesh {
                               that are not finite are opaque */
     const char *material_name; /* may be NULL */
     const uint16_t *indices16; /* instead of `indices`, which must then be NULL */
-    /* Bytes from one position, normal or UV to the next: multiples of 4, at most VSH_MAX_STRIDE; 0: tight.
-     * Calls copy arrays with strides, and 16-bit indices, while they run; charts keep the copies. Not for
-     * vsh_render(). */
-    size_t position_stride, normal_stride, uv_stride;
+    /* Bytes from one position to the next, a multiple of 4 up to VSH_MAX_STRIDE; 0: tight. Calls copy arrays
+     * with strides, and 16-bit indices, while they run; charts keep them. Not for vsh_render(). */
+    size_t position_stride;
+    size_t normal_stride; /* the same of normals */
+    size_t uv_stride;     /* the same of UVs */
 } vsh_mesh;
 
 /* Findings of vsh_mesh_check(). Vertices at equal positions count as one, so UV seams do not open edges. */

@@ -112,7 +112,7 @@ TEST(the_estimate_includes_parts_that_voxels_lose) {
         assert_true(measured[c] > 0.02);
         assert_true(said > 0.9 * measured[c] && said < 1.1 * measured[c]);
         assert_true(fabs(field * field + known->square_error / known->values - said * said) < 1e-9);
-        assert_true(known->held == TEXELS && known->values == TEXELS);
+        assert_true(known->compared == TEXELS && known->values == TEXELS);
     }
 }
 
@@ -130,7 +130,7 @@ TEST(exact_values_are_compared_with_rays_too) {
 TEST(without_the_casters_only_the_error_of_rays_is_known) {
     const stage *s = *state;
     FREED baked *b = bake(s, options_of(VSH_SHADOW_ADAPTIVE, VSH_AO_CONES), NULL);
-    assert_true(b->errors[0].held == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
+    assert_true(b->errors[0].compared == 0.0 && isnan(vsh_bake_error_field(&b->errors[0])));
     assert_true(vsh_bake_error_rmse(&b->errors[0]) == sqrt(b->errors[0].square_error / TEXELS));
     assert_true(isnan(vsh_bake_error_rmse(&b->errors[1]))); /* a preview knows nothing of its error */
 }
@@ -155,11 +155,11 @@ TEST(filled_texels_are_not_in_the_estimate) {
     measure(&low, b, measured);
     for (int c = 0; c < CHANNELS; ++c) {
         const double said = vsh_bake_error_rmse(&b->errors[c]);
-        const double held = sqrt(b->errors[c].held_square_error / b->errors[c].held);
+        const double compared = sqrt(b->errors[c].compared_square_error / b->errors[c].compared);
         /* one sample stands for several, of which some may be invalid */
         assert_true(b->errors[c].values < 0.9 * TEXELS);
-        assert_true(fabs(b->errors[c].held - b->errors[c].values) < 0.01 * b->errors[c].values);
-        assert_true(held > 0.9 * measured[c] && held < 1.1 * measured[c]);
+        assert_true(fabs(b->errors[c].compared - b->errors[c].values) < 0.01 * b->errors[c].values);
+        assert_true(compared > 0.9 * measured[c] && compared < 1.1 * measured[c]);
         assert_true(said > 0.9 * measured[c]); /* the noise of AO rays may be larger */
     }
     vshi_triangles_free(low.triangles);

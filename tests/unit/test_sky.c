@@ -132,7 +132,7 @@ static void check_floor(double half_x, double half_z, int32_t spacing, double bi
         assert_true(methods[m] != VSH_AO_EXACT || fabs(off.bias) < bias);
         assert_true(s->errors[0].values == 0.0 && s->errors[1].values == count);
         if (s->triangles != NULL) {
-            assert_true(s->errors[1].held == count && said > 0.8 * off.rmse);
+            assert_true(s->errors[1].compared == count && said > 0.8 * off.rmse);
         }
     }
 }
