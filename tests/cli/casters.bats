@@ -100,7 +100,7 @@ write_hill() {
     same_values one.exr out.exr
 }
 
-@test "what a terrain's image lacks is said, and what to do" {
+@test "missing or zero sizes of a terrain are refused with advice" {
     refuse_each bake <<'LIST'
 2 'terrain.png' '--height H, the height of white, and --size-world W' | terrain.png --ao 1 -o out.exr
 2 'terrain.png' 'give --size-world W, the length of its longer side' | terrain.png --height 2 --ao 1 -o out.exr
@@ -125,7 +125,7 @@ LIST
     [[ $output == *"caster 2: spheres"* ]]
 }
 
-@test "what is wrong with terrains, spheres and their files is told by its place, and refused in time" {
+@test "faults of terrains, spheres and their files are refused with their place" {
     echo nothing >bad.png
     refuse_scene '{"heightfield": "none.png", "size": [1, 1], "height": 1}' "$OVER" 3 none.png
     refuse_scene '{"spheres": "none.csv"}' "$FLOOR" 3 none.csv

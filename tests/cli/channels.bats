@@ -39,7 +39,7 @@ load helper
     refuses 2 "AO over a horizon: method cones" -- bake box.obj --sky y --ao 1 --ao-method cones -o box.exr
 }
 
-@test "what does not go together is told" {
+@test "channels without the options they need are refused" {
     write_scene box.json box.obj '"tint": [0, 1, 1]'
     refuse_each bake -o box.exr <<'LIST'
 2 "vdbshade: --bent-normals: needs --ao DISTANCE" | box.obj --sun 1,1,1 --bent-normals world

@@ -199,7 +199,7 @@ picture() {
     grep -q '<testsuites tests="4" failures="0">' out.xml || fail "counts"
 }
 
-@test "what cannot be compared is an error of its own" {
+@test "files that cannot be compared end with an error, not with a difference" {
     echo text >text.exr
     head -c 3000 golden.vdb >cut.vdb
     refuse_each compare <<'CASES'

@@ -65,7 +65,7 @@ can() {
     grep -A 4 '"confined": {' probe.json | grep -q "\"$1\": true"
 }
 
-@test "what the system refuses is one warning (but for Landlock), and told by --stats; --sandbox require makes it an error" {
+@test "missing confinements give one warning and appear in --stats; --sandbox require makes them an error" {
     local what part
     for what in "limits limits of resources" "seccomp seccomp (system calls)" "landlock Landlock (files)"; do
         part=${what#* }

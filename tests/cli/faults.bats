@@ -11,7 +11,7 @@ prepare() {
 
 QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points points.csv --quiet)
 
-@test "what killed runs have left is taken away by the next, and nothing else" {
+@test "a run removes what killed runs left, and nothing else" {
     local mine=(.out.99999999.tmp.exr .out.99999998-3.tmp.exr .stats.99999999.tmp.json)
     local other=(.out.99999999.tmp.png .out.tmp.exr .out2.99999999.tmp.exr .out.x.tmp.exr .stats.json.99999999.tmp)
     touch "${mine[@]}" "${other[@]}"

@@ -1,7 +1,7 @@
 # info: what a file holds, and what is wrong with it; units, materials and buffers of meshes.
 load helper
 
-@test "what a mesh, a level set and a scene hold" {
+@test "info lists the contents of a mesh, a level set and a scene" {
     info_tells box.obj "triangles: 12" "UV sets: 1" "bounds: 0 0 0 to 1 1 1"
     [[ $output != *problem* ]] || fail "a problem"
     succeed info "$ASSETS/cloister.glb"
@@ -70,7 +70,7 @@ sys.exit("\n".join(one for one in sys.argv[1:] if not eval(one)) or 0)' "${@:2}"
     refuses 3 none.obj -- info none.obj --json
 }
 
-@test "what is not read is refused with what would help" {
+@test "unknown files are refused with advice" {
     sed 's/"asset"/"extensionsRequired":["KHR_node_visibility"],"asset"/' "$MODELS/scene.gltf" >packed.gltf
     cp "$MODELS/scene.bin" .
     refuses 2 "KHR_node_visibility" -- info packed.gltf

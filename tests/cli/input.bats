@@ -112,7 +112,7 @@ JSON
     [ ! -e a.exr ] && [ ! -e b.exr ]
 }
 
-@test "what is cut short, or of another kind than its name says, ends with 3" {
+@test "files cut short, or of another kind than their name says, end with 3" {
     local one
     for one in exr png tif jpg; do
         "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o "whole.$one" 2>/dev/null
@@ -138,7 +138,7 @@ JSON
     untouched out.exr
 }
 
-@test "what can be read and says what cannot be used ends with 2, and its place" {
+@test "readable files with bad values end with 2 and the place" {
     printf 'v 0 0 0\nv 1 0\n' >bad.obj
     printf '{"casters": 1}' >bad.json
     printf 'a,b,c\n0,0,0\n' >bad.csv
@@ -225,7 +225,7 @@ by_each() {
     by_each far.json 4 "from the origin"
 }
 
-@test "what has no outline or no surface names the scene or the image" {
+@test "the error of an empty outline or surface names the scene or the image" {
     write_bake blank.json "{\"text\": \"  \", \"font\": \"$FONT\", \"height\": 1, \"thickness\": 1}" '"resolution": 8'
     by_each blank.json 2 "has no outline: nothing in it is solid"
     write_bake nothing.json '{"sdf": {"op": "subtraction", "of": [{"shape": "sphere", "radius": 1},
@@ -233,7 +233,7 @@ by_each() {
     by_each nothing.json 2 "no surface"
 }
 
-@test "what a scene names is told with the scene: a mask of a plane, an output, a lightmap's channel" {
+@test "errors of files that a scene names also name the scene" {
     printf '{"region": [-1, -1, 1, 1], "casters": [{"mask": "none.png", "size": 1}],
         "lights": [{"name": "a", "type": "disc", "position": [0, 0]}]}' >plane.json
     refuses 3 "plane.json: casters[0]: none.png: " -- flat plane.json --quiet -o out.exr

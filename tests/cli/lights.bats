@@ -133,7 +133,7 @@ write_scene() {
     info_tells scene.json "light 'lamp': sphere at 0.001 0.003 0,"
 }
 
-@test "what is wrong with a file of lights is told with its place" {
+@test "faults of a file of lights are refused with their place" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
     for one in '{"type": "file"}|lights[0]: key "file" is missing' \
         '{"type": "file", "file": "box.obj"}|lights[0].file: box.obj has no lights' \

@@ -192,7 +192,7 @@ inputs_are() {
     "$VDBSHADE" info "$1" | sed -n 's/^vdbshade_input_[0-9]*: sha256:[0-9a-f]* //p' | diff - <(printf "%s\n" "${@:2}") || fail "$1: other inputs"
 }
 
-@test "what decides where light comes through is an input" {
+@test "textures that cut out casters count as inputs" {
     bake masked.gltf one.exr
     inputs_are one.exr masked.gltf emblem.png
     bake whole.gltf whole.exr
@@ -288,7 +288,7 @@ LIST
     lit clamped.exr 89.0625 # the last column goes on: three quarters are there
 }
 
-@test "what leaves nothing out casts whole, and so does what cannot be had" {
+@test "casters cast whole if their mask is opaque or missing" {
     bake_obj '' whole.exr
     bake_obj 'map_d opaque.pgm' out.exr
     same out.exr whole.exr
@@ -316,7 +316,7 @@ LIST
     says "level.obj: the material library 'level.mtl' cannot be read"
 }
 
-@test "what is neither clear nor opaque is glass" {
+@test "materials neither clear nor opaque are glass" {
     bake_obj '' without.exr --no-cast material:leaf
     bake_obj 'map_d smoke.pgm' smoke.exr
     says "1 of 3 meshes have blended materials (glass, smoke) and cast no shadow"
@@ -351,7 +351,7 @@ LIST
     differ made.exr whole.exr
 }
 
-@test "where all vertices have one alpha it is a factor" {
+@test "one alpha at all vertices is a factor" {
     bake_leaf clear.exr "$(mask 0.5)" "$FAINT"
     lit clear.exr 100
     bake_leaf faint.exr "$(mask 0.25 "$TEXTURE")" "$FAINT"

@@ -56,7 +56,7 @@ said() {
     holds "$(said shadow estimated_rmse) <= 0.003"
 }
 
-@test "what voxels leave of an error is measured, told, and by exact not there" {
+@test "the error of voxels is measured and printed, and exact has none" {
     succeed_saying "shadow: the estimated error is " "above the limit of 0.01: " "comes from voxels of" "--method exact has none" -- \
         bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 --stats s.json -o a.exr
     [[ $stderr == *"estimated error: shadow "*"(the voxels' "* ]] || fail "$stderr"
@@ -100,7 +100,7 @@ by_rays() {
     grep -qx "vdbshade_ao: $1 within 0.5, .*8 rays, blue, frame 1" <<<"$output" || fail "what rays of AO?"
 }
 
-@test "what was asked for is had: rays by their name, and an error by a method that keeps it" {
+@test "methods by rays obey --rays, and --max-error alone gives what adaptive gives" {
     for method in rays adaptive exact; do
         by_rays $method
     done

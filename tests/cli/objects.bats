@@ -113,7 +113,7 @@ LIST
     [ -z "$stderr" ] || fail "--quiet said something"
 }
 
-@test "what users need not act on is a note, which --verbose alone prints" {
+@test "notes need no action, and only --verbose prints them" {
     write_boxes level.obj floor crate
     printf 'o card\nv 0 0 -3\nv 1 0 -3\nv 0 1 -3\nf -3 -2 -1\nf -1 -1 -2\n' >>level.obj
     succeed bake level.obj "${LEVEL[@]}" --receive floor -o out.exr

@@ -336,7 +336,7 @@ CASES
     untouched out.raw
 }
 
-@test "what is wrong on the command line is said" {
+@test "wrong options are refused by name" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
     refuse_each query scene.json <<'CASES'
 2 --points | -o out.csv

@@ -37,7 +37,7 @@ prepare() {
     done
 }
 
-@test "where the system gives fewer threads the bake is the same, with a note" {
+@test "with fewer threads than asked the bake is the same, with a note" {
     "$VDBSHADE" "${bake[@]}" --threads 1
     mv out.exr one.exr
     local most
@@ -60,7 +60,7 @@ prepare() {
     done
 }
 
-@test "where it refuses the memory that OpenVDB or OpenImageIO take, that is said" {
+@test "without memory for OpenVDB or OpenImageIO the error names the library" {
     local most refused=0
     for most in 40 60 80 100 120 140 160 200; do
         for what in "voxelize --resolution 16 -o out.vdb" "render --sun 1,2,1 --size 16 -o out.tif"; do

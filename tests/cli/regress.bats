@@ -43,7 +43,7 @@ clean() {
     clean
 }
 
-@test "what changed is baked, told, and put in the golden one's place when asked for" {
+@test "changed cases are reported, and --update replaces their golden bakes" {
     shade regress scenes --update
     scene other 8
     finds $'box: unchanged\nother: updated*' --update

@@ -175,7 +175,7 @@ LIGHTS
     [ "$(tail -c 4800 view.ppm | tr -d '\0' | wc -c)" -gt 1000 ] || fail "without a lightmap it is lit"
 }
 
-@test "what is rendered fills 80 to 90 % of the picture" {
+@test "surfaces fill 80 to 90 % of the picture" {
     for up in 0,1,0 0,0,1; do
         succeed render box.obj "${SUN[@]}" --size 50 --samples 2 --resolution 24 --background 0,0,0 --up $up -o view.ppm --quiet
         # Columns and rows of the pixels that are not black.

@@ -57,7 +57,7 @@ TUBE=(--sun 0.1,1,0.3 --sun-angle 60 --ao 1 --size 48 --quiet)
     succeed compare grown.exr filled.exr --max-difference 0 --max-coverage 0
 }
 
-@test "what seams and padding may be is said where they are something else" {
+@test "errors list the values of --seams and --padding" {
     write_tube tube.obj
     refuse_each bake tube.obj "${TUBE[@]}" -o out.exr <<'LIST'
 2 "--seams 'stitch': expected one of default, keep, fix" | --seams stitch

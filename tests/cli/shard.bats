@@ -35,7 +35,7 @@ one_is() {
     no_leftovers
 }
 
-@test "what crosses parts is as in one bake: seams, padding, shared rays, what is filled, every channel" {
+@test "seams, padding, shared rays, filled texels and every channel are those of one bake" {
     local options=(--irradiance --bent-normals world --sky y --error)
     write_scene all.json "${CLOISTER[0]}" '"invalid": true, "tint": "quadratic"'
     no_sun "${CLOISTER[@]:1}"
@@ -57,7 +57,7 @@ one_is() {
     done
 }
 
-@test "what is made of AO is finished by merge, too: irradiance with and without light from all around, bent normals in both spaces, the sky" {
+@test "merge finishes the channels made of AO: irradiance with and without ambient light, bent normals in both spaces, the sky" {
     local all=(--irradiance --ambient 0.3,0.2,0.1 --bent-normals tangent --sky -z --error)
     for options in "--irradiance --max-error 0.05" "--irradiance --ambient 0.3,0.2,0.1" "--bent-normals world" "--sky y --seams fix" \
         "${all[*]} --padding 20" "--irradiance --bent-normals tangent --sky y --method adaptive --ao-method adaptive --resolution 48"; do
@@ -66,7 +66,7 @@ one_is() {
     one_is out.glb "2 7 64" "${CLOISTER[@]}" "${all[@]}"
 }
 
-@test "so are an asset with its light in it, a terrain, objects of their own, and a scene of several lightmaps" {
+@test "parts of a lit asset, a terrain, separate objects and a scene of several lightmaps are one bake" {
     one_is out.glb 3 "${CLOISTER[@]}"
     printf '%s' '{"lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
         "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 64, "output": "out.exr"}]}' >terrain.json
@@ -177,7 +177,7 @@ one_is() {
     refuses 2 "out.exr.2-of-2.part: damaged" -- merge out.exr
 }
 
-@test "what a part names is read, not written: outputs are those that merge is given" {
+@test "merge writes only the outputs that it is given, not those that a part names" {
     parts out.exr 1 "" box.obj "${SMALL[@]}" --stats kept.json
     rm kept.json
     mv out.exr.1-of-1.part other.exr.1-of-1.part

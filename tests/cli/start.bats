@@ -1,7 +1,7 @@
 # A start is short because a command loads only the libraries that it needs.
 load helper
 
-@test "what a bake of triangles into an EXR or a PNG does not need is not loaded" {
+@test "a bake of triangles into an EXR or PNG loads no library that it does not need" {
     unless_sanitized "with a sanitizer all is in the program"
     local out
     for out in out.exr out.png; do

@@ -125,7 +125,7 @@ count() {
     grep -q "$(count texels) of 4096 texels" trade.html || fail "not said"
 }
 
-@test "what does not fit into the budget is left out and counted" {
+@test "runs beyond the budget are left out and counted" {
     succeed trade box.obj "${TINY[@]}" --budget 0.000001 -o trade.html --csv trade.csv
     grep -q 'did not fit into the budget' trade.html
     [[ $stderr == *"left out"* ]] || fail "not said"

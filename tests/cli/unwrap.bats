@@ -198,7 +198,7 @@ LIST
     ! show_gltf lit.glb text | grep -q TEXCOORD_1 || fail "new UVs"
 }
 
-@test "what does not go together with an atlas of objects or a largest size is refused" {
+@test "options that exclude an atlas of objects or a largest size are refused" {
     write_scene fit.json two.obj '' '"max_size": 64, "unwrap": "always"'
     no_sun "${FIT[@]}"
     refuses 2 max_size texels_per_unit -- bake fit.json "${rest[@]}" -o x.exr
@@ -272,7 +272,7 @@ scattered() {
     grep -q '^newmtl unlit' lit.mtl || fail 'no such material'
 }
 
-@test "what an OBJ cannot have, and files of others, are refused" {
+@test "OBJ outputs refuse what they cannot hold, and foreign files" {
     printf 'newmtl red\n' >lit.mtl
     refuses 2 'lit.mtl: would be replaced, which vdbshade has not written' -- bake bare.obj "${LIGHT[@]}" -o lit.obj
     [ "$(cat lit.mtl)" = 'newmtl red' ] && [ ! -e lit.obj ] && [ ! -e lit.preview.png ] || fail "$(ls)"

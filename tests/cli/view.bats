@@ -33,7 +33,7 @@ block() {
     done
 }
 
-@test "what scripts look for in the page is there once" {
+@test "the page has each element that its scripts use, once" {
     local id
     succeed view box.obj --planes box.exr -o box.html --quiet
     grep -oE '<[a-z0-9]+ ([^<>]* )?id="[a-z0-9-]+"' box.html | grep -oE 'id="[^"]+"' | sort >ids
@@ -179,7 +179,7 @@ C
                exit !(floor > 13000 && top > 3 && open > 200 && dark > 30 && under > 5 && bad == 0 && !off(sum / under, 0.609, 0.03)) }' vertices.txt
 }
 
-@test "what a scene does not take, and scenes that cannot be shown" {
+@test "options without a meaning for scenes, and empty scenes, are refused" {
     old_output page.html
     cp "$ASSETS/seeds.json" .
     echo '{"casters": [{"mesh": "gone.obj"}], "ao": {"distance": 1}}' >names.json
