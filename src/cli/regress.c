@@ -1,12 +1,11 @@
-/* vdbshade regress: bakes the scenes of a folder that changed, compares them with golden bakes, and reports.
+/* vdbshade regress: bakes the scenes of a folder, compares them with golden bakes, and reports.
  *
  * The folder may be a stranger's that a CI runs as it came. So only the command line of `regress` may ask for
  * written files, or for files parsed unconfined. */
-#define _GNU_SOURCE /* dladdr, memfd_create */
+#define _GNU_SOURCE /* memfd_create */
 #include "compare.h"
 
 #include <dirent.h>
-#include <dlfcn.h>
 #include <errno.h>
 #include <fnmatch.h>
 #include <signal.h>
@@ -19,18 +18,15 @@
 
 typedef struct regress_settings {
     cli_compare_settings compare; /* the first member */
-    const char *folder, *cache, *bakes, *only;
-    bool update, all;
+    const char *folder, *bakes, *only;
+    bool update;
 } regress_settings;
 
 static const cli_option options[] = {
     {.help = "Work"},
     {"update", NULL, "replace golden bakes that differ, and add missing ones",
      CLI_VALUE(FLAG, regress_settings, update)},
-    {"all", NULL, "bake unchanged cases, too", CLI_VALUE(FLAG, regress_settings, all)},
     {"only", "TEXT", "only cases whose names contain it", CLI_VALUE(TEXT, regress_settings, only)},
-    {"cache", "FILE", "cases that were alike, with their inputs (DIR/.regress-cache.json)",
-     CLI_VALUE(TEXT, regress_settings, cache)},
     {"bakes", "FOLDER", "keep the new bakes there", CLI_VALUE(TEXT, regress_settings, bakes)},
     CLI_COMPARE_OPTIONS("limits of all, instead of DIR/golden/OUTPUT.tolerance.json"),
     CLI_COMMON_OPTIONS,
@@ -48,8 +44,8 @@ static void add_line(lines *to, const char *text) {
     to->line[to->count] = NULL;
 }
 
-enum { UNCHANGED, ALIKE, UNLIKE, FAILED, UPDATED };
-static const char *const status_names[] = {"unchanged", "alike", "not alike", "failed", "updated"};
+enum { ALIKE, UNLIKE, FAILED, UPDATED };
+static const char *const status_names[] = {"alike", "not alike", "failed", "updated"};
 
 /* A scene, the command that bakes it, and the files that the command writes. */
 typedef struct regress_case {
@@ -58,11 +54,8 @@ typedef struct regress_case {
     const char *path;  /* FOLDER/SCENE */
     const cli_command *command;
     lines options;
-    const char *output;  /* for -o; NULL: the scene names its outputs */
-    lines outputs;       /* names of all files written */
-    lines inputs;        /* everything that the result depends on: equal lines, equal results */
-    size_t own_inputs;   /* count of those before the golden bakes */
-    const char *changed; /* the input that changed; NULL: unknown */
+    const char *output; /* for -o; NULL: the scene names its outputs */
+    lines outputs;      /* names of all files written */
     int status;
     int code;                    /* exit code of a failed bake */
     const char *reason;          /* its last error; "": unknown */
@@ -72,10 +65,8 @@ typedef struct regress_case {
 /* The one run of the process. */
 static struct {
     regress_settings settings;
-    const char *golden;                     /* folder of golden bakes */
-    const char *cache;                      /* file */
-    char *bakes;                            /* folder of the new bakes, absolute */
-    char program[64 + 2 * VSH_DIGEST_TEXT]; /* its version, its hash, and that of the library */
+    const char *golden; /* folder of golden bakes */
+    char *bakes;        /* folder of the new bakes, absolute */
     regress_case *cases;
     size_t case_count;
 } work;
@@ -87,21 +78,7 @@ static const char *in_folder(const char *folder, const char *name) {
 /* --- regress.json */
 
 static const char list_name[] = "regress.json";
-
-/* Parsed JSON takes a hundred times the bytes of its file. */
-enum { MOST_LIST = 4 << 20, MOST_SCENE = 64 << 20 };
-
-/* Reads a JSON file that strangers may have made; NULL if that fails. */
-static json_t *load_json(const char *path, uint64_t most) {
-    FILE *file;
-    uint64_t size;
-    if (vshi_input_open(path, path, most, &file, &size, NULL) != VSH_OK) {
-        return NULL;
-    }
-    json_t *root = json_loadf(file, 0, NULL);
-    fclose(file);
-    return root;
-}
+enum { MOST_LIST = 4 << 20 }; /* bytes */
 
 static regress_case *add_case(const char *scene, const char *name) {
     work.cases = realloc(work.cases, (work.case_count + 1) * sizeof *work.cases);
@@ -235,89 +212,6 @@ static int add_scenes(void) {
     return CLI_OK;
 }
 
-/* --- inputs of a case */
-
-static int add_digest(regress_case *one, const char *what, const char *path) {
-    char digest[VSH_DIGEST_TEXT] = "none";
-    if (access(path, F_OK) == 0) {
-        CLI_TRY(cli_check(vsh_file_digest(path, &cli_run, digest, &cli_error)));
-    }
-    add_line(&one->inputs, cli_keep_text("%s: %s", what, digest));
-    return CLI_OK;
-}
-
-/* Adds the limits of the command line. */
-static void add_limits(regress_case *one) {
-    const vsh_compare_files_options *o = &work.settings.compare.options;
-    add_line(&one->inputs, cli_keep_text("coverage: %s, at most %.9g, padding %d", o->coverage,
-                                         o->coverage_limit, work.settings.compare.padding));
-    add_line(&one->inputs, cli_keep_text("step %.9g, reach %d, noise %.9g", o->step, o->reach, o->noise));
-    for (int i = 0; i < VSH_MEASURE_COUNT; ++i) {
-        if (!isnan(o->limits[i])) {
-            add_line(&one->inputs,
-                     cli_keep_text("limit of %s: %.9g", vsh_get_name(VSH_NAMES_MEASURE, i), o->limits[i]));
-        }
-    }
-}
-
-/* Adds files in options, which may be FILE.vdb:GRID. */
-static void add_option_files(const regress_case *one, lines *files) {
-    for (size_t i = 0; i < one->options.count; ++i) {
-        const char *word = one->options.line[i];
-        const char *path = word[0] == '/' ? word : in_folder(work.settings.folder, word);
-        struct stat status;
-        cli_split_grid(&path);
-        if (stat(path, &status) == 0 && S_ISREG(status.st_mode)) {
-            add_line(files, path);
-        }
-    }
-}
-
-/* Adds digests of the scene's file and of all files that it names. */
-static int add_provenance(regress_case *one, const vsh_scene *scene, const vsh_flat_scene *flat) {
-    lines files = {NULL, 0};
-    cli_provenance origin;
-    add_line(&files, one->path);
-    for (size_t i = 0; flat != NULL && i < flat->caster_count; ++i) {
-        add_line(&files, flat->casters[i].path); /* or NULL */
-    }
-    add_option_files(one, &files);
-    const int code = cli_provenance_make(scene, files.line, files.count, NULL, &origin);
-    for (size_t i = 0; i < origin.count; ++i) {
-        if (strcmp(origin.attributes[i].name, "vdbshade_command") != 0) { /* that of regress */
-            add_line(&one->inputs,
-                     cli_keep_text("%s: %s", origin.attributes[i].name, origin.attributes[i].value));
-        }
-    }
-    cli_provenance_free(&origin);
-    free(files.line);
-    return code;
-}
-
-/* Adds golden bakes and their tolerances, in place of those listed before. */
-static int add_golden(regress_case *one) {
-    static const char *const endings[] = {"", ".tolerance.json"};
-    one->inputs.count = one->own_inputs;
-    for (size_t i = 0; i < 2 * one->outputs.count; ++i) {
-        const char *name = cli_keep_text("%s%s", one->outputs.line[i / 2], endings[i % 2]);
-        CLI_TRY(add_digest(one, cli_keep_text("golden %s", name), in_folder(work.golden, name)));
-    }
-    const char *tolerances = work.settings.compare.options.tolerances;
-    return tolerances != NULL ? add_digest(one, "tolerances", tolerances) : CLI_OK;
-}
-
-static int list_inputs(regress_case *one, const vsh_scene *scene, const vsh_flat_scene *flat) {
-    add_line(&one->inputs, cli_keep_text("program: %s", work.program));
-    add_line(&one->inputs, cli_keep_text("command: %s", one->command->name));
-    for (size_t i = 0; i < one->options.count; ++i) {
-        add_line(&one->inputs, cli_keep_text("option: %s", one->options.line[i]));
-    }
-    CLI_TRY(add_provenance(one, scene, flat));
-    add_limits(one);
-    one->own_inputs = one->inputs.count;
-    return add_golden(one);
-}
-
 /* --- all cases */
 
 static void mark_failed(regress_case *one, int code) {
@@ -326,37 +220,39 @@ static void mark_failed(regress_case *one, int code) {
     one->reason = cli_keep_text("%s", cli_last_line);
 }
 
+/* Whether a scene is one of `flat`. Parsed JSON takes a hundred times the bytes of its file, so files beyond
+ * the memory limit count as scenes of `bake`, which refuses them. */
 static bool has_region(const char *path) {
-    json_t *root = load_json(path, MOST_SCENE);
+    const uint64_t most = cli_run.memory_limit > 0 ? cli_run.memory_limit / 100 : UINT64_MAX;
+    FILE *file;
+    uint64_t size;
+    if (vshi_input_open(path, path, most, &file, &size, NULL) != VSH_OK) {
+        return false;
+    }
+    json_t *root = json_loadf(file, 0, NULL);
+    fclose(file);
     const bool has = json_object_get(root, "region") != NULL;
     json_decref(root);
     return has;
 }
 
-/* Reads the scene, and completes command and outputs. A scene with a region is for `flat`. It is read as one
- * first, because that checks the memory limit before it allocates. */
-static int read_scene(regress_case *one, vsh_scene **scene, vsh_flat_scene **flat) {
-    vsh_result result = VSH_OK;
+/* Reads the scene, and lists the outputs. */
+static int find_outputs(regress_case *one) {
+    vsh_scene *scene = NULL;
+    vsh_flat_scene *flat = NULL;
+    CLI_TRY(cli_check(one->command == &cli_flat ? vsh_flat_scene_read(one->path, &cli_run, &flat, &cli_error)
+                                                : vsh_scene_read(one->path, &cli_run, &scene, &cli_error)));
+    if (one->output == NULL && flat != NULL && flat->output != NULL) {
+        one->output = cli_keep_text("%s", cli_file_name(flat->output));
+    }
     if (one->output != NULL) {
         add_line(&one->outputs, one->output);
     }
-    if (one->command == NULL || one->command == &cli_flat) {
-        result = vsh_flat_scene_read(one->path, &cli_run, flat, &cli_error);
+    for (size_t i = 0; one->output == NULL && one->command == &cli_bake && i < scene->receiver_count; ++i) {
+        add_line(&one->outputs, cli_keep_text("%s", cli_file_name(scene->receivers[i].output)));
     }
-    if (one->command == NULL) {
-        one->command =
-            result == VSH_OK || result == VSH_ERROR_LIMIT || has_region(one->path) ? &cli_flat : &cli_bake;
-    }
-    CLI_TRY(cli_check(one->command == &cli_flat ? result
-                                                : vsh_scene_read(one->path, &cli_run, scene, &cli_error)));
-    if (one->output == NULL && *flat != NULL && (*flat)->output != NULL) {
-        one->output = cli_keep_text("%s", cli_file_name((*flat)->output));
-        add_line(&one->outputs, one->output);
-    }
-    for (size_t i = 0; one->output == NULL && one->command == &cli_bake && i < (*scene)->receiver_count;
-         ++i) {
-        add_line(&one->outputs, cli_keep_text("%s", cli_file_name((*scene)->receivers[i].output)));
-    }
+    vsh_scene_free(scene);
+    vsh_flat_scene_free(flat);
     return one->outputs.count > 0
                ? CLI_OK
                : cli_usage("%s: nothing says what '%s' writes; give it an \"output\" in %s", one->path,
@@ -365,21 +261,17 @@ static int read_scene(regress_case *one, vsh_scene **scene, vsh_flat_scene **fla
 
 /* A case that cannot be read or written is marked, so that the others go on. */
 static int complete_case(regress_case *one) {
-    vsh_scene *scene = NULL;
-    vsh_flat_scene *flat = NULL;
-    CLI_TRY(one->command != NULL ? check_options(one) : CLI_OK);
-    int code = read_scene(one, &scene, &flat);
-    const int refused = check_options(one);
-    code = code == CLI_OK && refused == CLI_OK ? list_inputs(one, scene, flat) : code;
-    vsh_scene_free(scene);
-    vsh_flat_scene_free(flat);
-    CLI_TRY(refused);
+    if (one->command == NULL) {
+        one->command = has_region(one->path) ? &cli_flat : &cli_bake;
+    }
+    CLI_TRY(check_options(one));
+    int code = find_outputs(one);
     if (code == CLI_USAGE || code == CLI_FILE) {
         mark_failed(one, code);
         code = CLI_OK;
     }
     if (one->outputs.count == 0) { /* reported under the scene's own name */
-        add_line(&one->outputs, one->scene);
+        add_line(&one->outputs, one->output != NULL ? one->output : one->scene);
     }
     one->comparisons = calloc(one->outputs.count, sizeof *one->comparisons);
     return code;
@@ -428,64 +320,6 @@ static int find_cases(void) {
         CLI_TRY(complete_case(&work.cases[i]));
     }
     return check_unique();
-}
-
-/* --- the cache: the inputs of each case that was alike */
-
-/* Names the input of a line: a file's name, or the text before the colon. */
-static const char *name_of_input(const char *line) {
-    static const char input[] = "vdbshade_input_", sum[] = "sha256:";
-    const char *digest = strncmp(line, input, sizeof input - 1) == 0 ? strstr(line, sum) : NULL;
-    const char *name = digest != NULL ? strchr(digest, ' ') : NULL;
-    return name != NULL ? name + 1 : cli_keep_text("%.*s", (int)strcspn(line, ":"), line);
-}
-
-/* Compares the inputs of a case with those of the cache, which may be missing. */
-static void find_change(const json_t *before, regress_case *one) {
-    one->status = UNLIKE;
-    for (size_t i = 0; before != NULL && i < one->inputs.count; ++i) {
-        const char *line = json_string_value(json_array_get(before, i));
-        if (line == NULL || strcmp(line, one->inputs.line[i]) != 0) {
-            one->changed = name_of_input(one->inputs.line[i]);
-            return;
-        }
-    }
-    if (json_array_size(before) == one->inputs.count) {
-        one->status = UNCHANGED;
-    }
-}
-
-/* Ignores a cache that cannot be read. */
-static void read_cache(void) {
-    json_t *root = load_json(work.cache, MOST_LIST);
-    for (size_t i = 0; i < work.case_count; ++i) {
-        regress_case *one = &work.cases[i];
-        if (one->status != FAILED) {
-            find_change(json_object_get(json_object_get(root, "alike"), one->name), one);
-        }
-    }
-    json_decref(root);
-}
-
-/* Saves the inputs of cases that are alike, and keeps cases that --only left out. */
-static int write_cache(void) {
-    json_t *before = load_json(work.cache, MOST_LIST), *alike = json_object();
-    if (work.settings.only != NULL) {
-        json_object_update(alike, json_object_get(before, "alike"));
-    }
-    for (size_t i = 0; i < work.case_count; ++i) {
-        const regress_case *one = &work.cases[i];
-        json_object_del(alike, one->name);
-        if (one->status != UNLIKE && one->status != FAILED) {
-            json_t *inputs = json_array();
-            for (size_t k = 0; k < one->inputs.count; ++k) {
-                json_array_append_new(inputs, json_string(one->inputs.line[k]));
-            }
-            json_object_set_new(alike, one->name, inputs);
-        }
-    }
-    json_decref(before);
-    return cli_write_json(work.cache, json_pack("{s:o}", "alike", alike));
 }
 
 /* --- baking, in child processes and before there are threads */
@@ -616,7 +450,7 @@ static int bake(const regress_case *one) {
 static int bake_all(void) {
     for (size_t i = 0; i < work.case_count; ++i) {
         regress_case *one = &work.cases[i];
-        if (one->status == FAILED || (one->status == UNCHANGED && !work.settings.all)) {
+        if (one->status == FAILED) {
             continue;
         }
         one->status = UNLIKE;
@@ -669,7 +503,7 @@ static int copy(const char *from, const char *to) {
     return code;
 }
 
-/* Replaces golden bakes, each whole or not at all. They are inputs, so those are listed again. */
+/* Replaces golden bakes, each whole or not at all. */
 static int update_case(regress_case *one) {
     if (mkdir(work.golden, 0777) != 0 && errno != EEXIST) {
         return fail_making(work.golden);
@@ -682,7 +516,7 @@ static int update_case(regress_case *one) {
         }
     }
     one->status = UPDATED;
-    return add_golden(one);
+    return CLI_OK;
 }
 
 static int compare_all(void) {
@@ -709,8 +543,7 @@ static const char *describe_failure(const regress_case *one) {
 static void print_lines(void) {
     for (size_t i = 0; i < work.case_count; ++i) {
         const regress_case *one = &work.cases[i];
-        printf("%s: %s", one->name, status_names[one->status]);
-        printf(one->changed != NULL ? " (changed: %s)\n" : "\n", one->changed);
+        printf("%s: %s\n", one->name, status_names[one->status]);
         for (size_t k = 0; k < one->outputs.count; ++k) {
             const cli_comparison *c = &one->comparisons[k];
             const char *name = one->outputs.line[k];
@@ -718,7 +551,7 @@ static void print_lines(void) {
                 printf("  %s: %s\n", name, describe_failure(one));
             } else if (one->status == UPDATED && c->golden == NULL) {
                 printf("  %s: is the golden bake now\n", name);
-            } else if (one->status != UNCHANGED && !c->alike) {
+            } else if (!c->alike) {
                 cli_comparison_print(c, cli_keep_text("  %s: ", name));
             }
         }
@@ -731,15 +564,15 @@ static void print_json(void) {
         const regress_case *one = &work.cases[i];
         const bool failed = one->status == FAILED;
         json_t *outputs = json_array();
-        for (size_t k = 0; k < one->outputs.count && one->status != UNCHANGED && !failed; ++k) {
+        for (size_t k = 0; k < one->outputs.count && !failed; ++k) {
             json_array_append_new(outputs, cli_comparison_json(&one->comparisons[k]));
         }
         json_array_append_new(
-            cases, json_pack("{s:o,s:s,s:o,s:o,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
-                             status_names[one->status], "changed", cli_utf8_json(one->changed), "exit_code",
-                             failed ? json_integer(one->code) : json_null(), "reason",
-                             failed && one->reason[0] != '\0' ? cli_utf8_json(one->reason) : json_null(),
-                             "outputs", outputs));
+            cases,
+            json_pack("{s:o,s:s,s:o,s:o,s:o}", "name", cli_utf8_json(one->name), "status",
+                      status_names[one->status], "exit_code", failed ? json_integer(one->code) : json_null(),
+                      "reason", failed && one->reason[0] != '\0' ? cli_utf8_json(one->reason) : json_null(),
+                      "outputs", outputs));
     }
     cli_write_json(NULL, json_pack("{s:o}", "cases", cases));
 }
@@ -757,7 +590,6 @@ static int write_reports(void) {
             cli_comparison *c = &all[at++];
             *c = one->comparisons[k];
             c->name = in_folder(one->name, one->outputs.line[k]);
-            c->alike = c->alike || one->status == UNCHANGED;
             if (one->status == FAILED && cli_comparison_problem(c, 0) == NULL) {
                 c->problem = describe_failure(one);
             }
@@ -769,21 +601,6 @@ static int write_reports(void) {
 }
 
 /* --- the command */
-
-/* Hashes program and library: another version may bake other values. */
-static int hash_program(void) {
-    char program[VSH_DIGEST_TEXT], library[VSH_DIGEST_TEXT] = "";
-    CLI_TRY(cli_check(vsh_file_digest("/proc/self/exe", NULL, program, &cli_error)));
-    Dl_info found;
-    const char *(*const version)(void) = vsh_version;
-    void *address;
-    memcpy(&address, &version, sizeof address);
-    if (dladdr(address, &found) != 0 && found.dli_fname != NULL) {
-        vsh_file_digest(found.dli_fname, NULL, library, NULL); /* empty if there is no such file */
-    }
-    snprintf(work.program, sizeof work.program, "%s %s %s", vsh_version(), program, library);
-    return CLI_OK;
-}
 
 /* Returns the exit code of the first failed case, else whether all cases are alike. */
 static int find_verdict(void) {
@@ -801,18 +618,13 @@ static int find_verdict(void) {
 
 static int run_cases(void) {
     const regress_settings *s = &work.settings;
+    const char *const outputs[] = {s->compare.junit, s->compare.html};
     work.golden = in_folder(s->folder, "golden");
-    work.cache = s->cache != NULL ? s->cache : in_folder(s->folder, ".regress-cache.json");
-    const char *const outputs[] = {s->compare.junit, s->compare.html, work.cache};
-    CLI_TRY(hash_program());
     CLI_TRY(find_cases());
-    CLI_TRY(s->cache == NULL ? cli_check_links(work.golden, work.cache) : CLI_OK);
     CLI_TRY(cli_check_outputs(outputs, CLI_COUNT(outputs), NULL, 0, NULL));
-    read_cache();
     CLI_TRY(make_folder());
     CLI_TRY(bake_all());
     CLI_TRY(compare_all());
-    CLI_TRY(write_cache());
     if (s->compare.json) {
         print_json();
     } else if (!cli_given.quiet) {
@@ -837,8 +649,8 @@ static int regress_main(int argc, char **argv) {
 
 const cli_command cli_regress = {
     "regress", "DIR [options]", "bakes a folder's scenes and compares them with golden bakes",
-    "Bakes the scenes of a folder whose inputs, options or golden bakes changed, and compares them with\n"
-    "DIR/golden as 'vdbshade compare' does. Scenes are DIR/*.json. DIR/regress.json names cases with\n"
-    "their own commands and options. Ends with 0 if all are alike, and with 1 if one is not, or has no\n"
-    "golden bake. See docs/pipeline.md. Numbers in brackets are defaults.",
+    "Bakes the scenes of a folder, and compares them with DIR/golden as 'vdbshade compare' does. Scenes\n"
+    "are DIR/*.json. DIR/regress.json names cases with their own commands and options. Ends with 0 if\n"
+    "all are alike, and with 1 if one is not, or has no golden bake. See docs/pipeline.md. Numbers in\n"
+    "brackets are defaults.",
     CLI_ENDING(options, regress_main)};
