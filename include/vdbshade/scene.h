@@ -199,15 +199,6 @@ static inline vsh_receiver vsh_receiver_default(void) {
 
 /* --- scenes */
 
-/* A file whose lights a scene uses. */
-typedef struct vsh_light_file {
-    const char *path; /* of a .glb or .gltf */
-    double angle;     /* these two as in vsh_lights_read() */
-    double radius;
-    size_t first; /* lights[first …] of the scene come from the file, */
-    size_t count; /* `count` > 0 of them */
-} vsh_light_file;
-
 /* A scene. Paths are as the system takes them; vsh_scene_read() resolves relative ones from the scene file's
  * folder. */
 typedef struct vsh_scene {
@@ -237,9 +228,6 @@ typedef struct vsh_scene {
                              voxels */
     int32_t cast_blended; /* nonzero: meshes of blended materials cast where their texture's alpha is 0.5 or
                              more */
-    /* [light_file_count], by `first`: origin of some lights; may be empty */
-    const vsh_light_file *light_files;
-    size_t light_file_count;
 } vsh_scene;
 
 /* An empty scene. */

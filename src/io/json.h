@@ -15,7 +15,7 @@ typedef struct vshi_json_block vshi_json_block;
 /* The state of reading one file. Callers set the first three members. */
 typedef struct vshi_json {
     const char *path;   /* for messages, and as the folder of the paths in it */
-    const vsh_run *run; /* resolved; NULL: do not open files that the text names */
+    const vsh_run *run; /* resolved; of vshi_json_read() */
     vsh_error *error;
     const char *text;
     size_t size;

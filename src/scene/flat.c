@@ -78,8 +78,9 @@ static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *ma
     }
     *scene = vsh_flat_scene_default();
     VSHI_TRY(vshi_read_object(reader, root, &vshi_flat_table, 1, "a flat scene", scene));
-    const vsh_scene lit = {.lights = scene->lights, .light_count = scene->light_count};
-    return vshi_member(root, "lights", &lights) ? vshi_check_light_names(reader, &lights, &lit) : VSH_OK;
+    return vshi_member(root, "lights", &lights)
+               ? vshi_check_light_names(reader, &lights, scene->lights, scene->light_count)
+               : VSH_OK;
 }
 
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,

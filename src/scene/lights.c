@@ -13,11 +13,9 @@
 
 /* --- one light */
 
-/* Names the types of lights, then a file of lights (read_item()). */
 static const char *type_name(int32_t i) {
     const vshi_light_type *type = vshi_light_type_of(i);
-    const bool behind = type == NULL && i > 0 && vshi_light_type_of(i - 1) != NULL;
-    return type != NULL ? type->name : behind ? "file" : NULL;
+    return type != NULL ? type->name : NULL;
 }
 
 static vshi_key type_key(bool flat) {
@@ -122,7 +120,7 @@ static vsh_result check_light(vshi_json *reader, const vshi_value *value, const 
                                                     : vshi_json_fail(reader, value, "%.400s", error.message);
 }
 
-static vsh_result read_light(vshi_json *reader, const vshi_value *value, void *member) {
+vsh_result vshi_read_light(vshi_json *reader, const vshi_value *value, void *member) {
     vsh_light *light = member;
     *light = vsh_light_default();
     VSHI_TRY(read_keys(reader, value, false, light));
@@ -149,120 +147,19 @@ vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void
     return check_light(reader, value, light);
 }
 
-/* --- lists of lights and of files with lights */
-
-enum { MAX_LIGHTS = VSH_MAX_CHANNELS - 5 /* ao, A and three of irradiance must fit into the image too */ };
-
-/* An item of the list. */
-typedef struct item {
-    vsh_light light;
-    vsh_light_file file; /* path NULL: a light */
-} item;
-
-#define AT(member) .offset = offsetof(vsh_light_file, member)
-static const vshi_key file_keys[] = {
-    VSHI_KEY("type", LATER, .required = VSHI_ALL),
-    VSHI_KEY("file", PATH, AT(path), .required = VSHI_ALL),
-    VSHI_KEY("angle_deg", DEGREES, AT(angle), .highest = 180.0, .flags = VSHI_BELOW),
-    VSHI_KEY("radius", NUMBER, AT(radius), .highest = VSHI_LARGEST),
-};
-static const vshi_table file_table = VSHI_TABLE(file_keys);
-
-static vsh_result read_item(vshi_json *reader, const vshi_value *value, void *member) {
-    item *one = member;
-    VSHI_TRY(vshi_expect(reader, value, JSON_OBJECT));
-    const char *type = json_string_value(json_object_get(value->json, "type"));
-    if (type == NULL || strcmp(type, "file") != 0) {
-        return read_light(reader, value, &one->light);
-    }
-    one->file.angle = vsh_light_default().angle;
-    return vshi_read_object(reader, value, &file_table, VSHI_ALL, "a file of lights", &one->file);
-}
-
-/* Finds the list's item of a light: a file's item has several lights, or none. */
-static size_t find_item(const vsh_scene *scene, size_t light) {
-    size_t place = light;
-    for (size_t i = 0; i < scene->light_file_count && light >= scene->light_files[i].first; ++i) {
-        const vsh_light_file *file = &scene->light_files[i];
-        if (light < file->first + file->count) {
-            return place - (light - file->first);
-        }
-        place = place + 1 - file->count;
-    }
-    return place;
-}
-
-vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene) {
-    for (size_t i = 0; i < scene->light_count; ++i) {
+vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_light *lights,
+                                  size_t count) {
+    for (size_t i = 0; i < count; ++i) {
         for (size_t k = 0; k < i; ++k) {
-            if (strcmp(scene->lights[i].name, scene->lights[k].name) != 0) {
-                continue;
-            }
-            const vshi_value of = vshi_item(list, find_item(scene, i));
+            const vshi_value light = vshi_item(list, i);
             vshi_value name;
-            return scene->light_file_count == 0 && vshi_member(&of, "name", &name)
-                       ? vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too",
-                                        scene->lights[i].name, find_item(scene, k))
-                       : vshi_json_fail(reader, &of, "has a light \"%s\", as lights[%zu] has",
-                                        scene->lights[i].name, find_item(scene, k));
+            if (strcmp(lights[i].name, lights[k].name) == 0 && vshi_member(&light, "name", &name)) {
+                return vshi_json_fail(reader, &name, "\"%s\" is the name of lights[%zu] too", lights[i].name,
+                                      k);
+            }
         }
     }
     return VSH_OK;
-}
-
-/* Adds the light of an item, or those of its file, behind those that the scene has. */
-static vsh_result add_item(vshi_json *reader, const vshi_value *value, const item *one, vsh_light *all,
-                           vsh_light_file *files, vsh_scene *scene) {
-    const bool file = one->file.path != NULL;
-    vsh_light *read = NULL;
-    size_t count = file ? 0 : 1;
-    vshi_value path;
-    vsh_result result = VSH_OK;
-    if (file && reader->run != NULL) {
-        VSHI_TRY_DONE(vsh_lights_read(one->file.path, one->file.angle, one->file.radius, scene->unit,
-                                      reader->run, &read, &count, reader->error));
-        if (count == 0 && vshi_member(value, "file", &path)) {
-            result = vshi_json_fail(reader, &path, "%.200s has no lights; those of a glTF or GLB are read",
-                                    one->file.path);
-            goto done;
-        }
-    }
-    if (count > MAX_LIGHTS - scene->light_count) {
-        result =
-            vshi_json_fail(reader, value, "has %zu lights, which with the lights before are more than %d",
-                           count, MAX_LIGHTS);
-        goto done;
-    }
-    if (file) {
-        vsh_light_file *added = &files[scene->light_file_count++];
-        *added = one->file;
-        added->first = scene->light_count;
-        added->count = count;
-    }
-    for (size_t i = 0; i < count; ++i) {
-        all[scene->light_count++] = file ? read[i] : one->light;
-    }
-done:
-    vsh_lights_free(read);
-    return result;
-}
-
-vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene *scene) {
-    static const vshi_key key = {
-        .kind = VSHI_LIST, .read = read_item, .count = sizeof(item), .highest = MAX_LIGHTS};
-    vshi_list items;
-    vsh_light *lights;
-    vsh_light_file *files;
-    VSHI_TRY(vshi_read_value(reader, list, &key, &items));
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&files, items.count, sizeof *files, "files of lights"));
-    VSHI_TRY(vshi_json_allocate(reader, (void **)&lights, MAX_LIGHTS, sizeof *lights, "lights"));
-    scene->lights = lights;
-    scene->light_files = files;
-    for (size_t i = 0; i < items.count; ++i) {
-        const vshi_value value = vshi_item(list, i);
-        VSHI_TRY(add_item(reader, &value, (const item *)items.items + i, lights, files, scene));
-    }
-    return vshi_check_light_names(reader, list, scene);
 }
 
 /* --- lights of a model */

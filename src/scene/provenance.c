@@ -53,7 +53,7 @@ static vsh_result copy_path(file_list *inputs, const char *path, vsh_error *erro
     return path != NULL ? add_path(inputs, strdup(path), error) : VSH_OK;
 }
 
-/* Lists `files`, the files of casters, receivers and lights, then the files beside models (io/model/model.h),
+/* Lists `files`, the files of casters and receivers, then the files beside models (io/model/model.h),
  * readable or not. `scene` may be NULL. Free the inputs also after an error. */
 static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, size_t file_count,
                               const vsh_run *run, vshi_job *job, file_list *inputs, vsh_error *error) {
@@ -66,9 +66,6 @@ static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, 
     for (size_t i = 0; scene != NULL && i < scene->receiver_count; ++i) {
         const vsh_receiver *receiver = &scene->receivers[i];
         VSHI_TRY(copy_path(inputs, receiver->type != VSH_RECEIVER_PLANE ? receiver->path : NULL, error));
-    }
-    for (size_t i = 0; scene != NULL && i < scene->light_file_count; ++i) {
-        VSHI_TRY(copy_path(inputs, scene->light_files[i].path, error));
     }
     const size_t named = inputs->count;
     for (size_t i = 0; i < named; ++i) {

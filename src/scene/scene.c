@@ -14,6 +14,7 @@
 #include <vdbshade/picture.h>
 
 enum { MAX_ITEMS = 65536 };
+enum { MAX_LIGHTS = VSH_MAX_CHANNELS - 5 /* ao, A and three of irradiance must fit into the image too */ };
 
 /* --- receivers */
 
@@ -378,7 +379,8 @@ static const vshi_key scene_keys[] = {
                          "thickness of sheets and of walls behind rooms' faces")),
     VSHI_KEY("layers", LIST, AT(layers), .highest = VSHI_MAX_LAYERS, .read = read_layer,
              .count = sizeof(vsh_scene_layer)),
-    VSHI_KEY("lights", LATER, .offset = 0),
+    VSHI_KEY("lights", LIST, AT(lights), .highest = MAX_LIGHTS, .read = vshi_read_light,
+             .count = sizeof(vsh_light)),
     VSHI_KEY("ao", CUSTOM, .read = read_ao),
     VSHI_KEY(
         "irradiance", BOOL, AT(irradiance),
@@ -444,6 +446,7 @@ static const vshi_key scene_keys[] = {
 const vshi_table vshi_scene_table = VSHI_TABLE(scene_keys);
 _Static_assert(offsetof(vsh_scene, caster_count) == offsetof(vsh_scene, casters) + sizeof(void *) &&
                    offsetof(vsh_scene, layer_count) == offsetof(vsh_scene, layers) + sizeof(void *) &&
+                   offsetof(vsh_scene, light_count) == offsetof(vsh_scene, lights) + sizeof(void *) &&
                    offsetof(vsh_scene, receiver_count) == offsetof(vsh_scene, receivers) + sizeof(void *),
                "lists are as vshi_list");
 
@@ -560,15 +563,15 @@ static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *ma
         VSHI_TRY(check_outputs(reader, &receivers, scene));
     }
     VSHI_TRY(add_terrains(reader, root, scene));
-    if (vshi_member(root, "lights", &lights)) { /* after the unit of files' numbers */
-        VSHI_TRY(vshi_read_lights(reader, &lights, scene));
+    if (vshi_member(root, "lights", &lights)) {
+        VSHI_TRY(vshi_check_light_names(reader, &lights, scene->lights, scene->light_count));
     }
     return check_layers(reader, root, scene);
 }
 
-vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, const vsh_run *run,
-                            vsh_scene **scene, vsh_error *error) {
-    vshi_json reader = {.path = path, .run = run, .error = error, .text = text, .size = size};
+vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
+                            vsh_error *error) {
+    vshi_json reader = {.path = path, .error = error, .text = text, .size = size};
     void *made;
     const vsh_result result = vshi_json_parse(&reader, sizeof **scene, read_scene, &made);
     *scene = made;

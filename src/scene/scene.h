@@ -17,10 +17,9 @@ double vshi_provenance_max_error(const vsh_attribute *attributes, size_t count, 
 /* Keys with options are settings. */
 extern const vshi_table vshi_scene_table, vshi_ao_table, vshi_flat_table;
 
-/* As vsh_scene_read(), of a text that was read from `path`. With a run of NULL no file is opened, so files of
- * lights have no lights. */
-vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, const vsh_run *run,
-                            vsh_scene **scene, vsh_error *error);
+/* As vsh_scene_read(), of a text that was read from `path`. */
+vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh_scene **scene,
+                            vsh_error *error);
 
 /* Reads the file of a scene, or of a flat one, as vshi_json_read(); refuses scenes of other programs. */
 vsh_result vshi_scene_file_read(const char *path, const vsh_run *run, size_t size, vshi_read_fn *read,
@@ -42,11 +41,10 @@ vsh_result vshi_read_patterns(vshi_json *reader, const vshi_value *value, void *
 /* --- lights (lights.c) */
 
 vsh_result vshi_read_flat_light(vshi_json *reader, const vshi_value *value, void *light);
-/* Reads the list of lights and its files into a scene whose unit is known. Without the reader's run, lights
- * of files are missing. Fails if two lights have one name. */
-vsh_result vshi_read_lights(vshi_json *reader, const vshi_value *list, vsh_scene *scene);
-/* Fails if two lights of a scene have one name; `list` is their place in the file. */
-vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_scene *scene);
+vsh_result vshi_read_light(vshi_json *reader, const vshi_value *value, void *member);
+/* Fails if two of the lights [count] have one name; `list` is their place in the file. */
+vsh_result vshi_check_light_names(vshi_json *reader, const vshi_value *list, const vsh_light *lights,
+                                  size_t count);
 
 /* --- images (scene.c) */
 

@@ -1,4 +1,4 @@
-# --lights, and "file" among a scene's lights: those that a glTF has, with those that the command line or a scene names.
+# --lights: the lights of a glTF, with those that the command line or a scene names.
 load helper
 
 # write_lit FILE NODES LIGHTS: a floor of 4 × 4 and a plate over it, with nodes that carry lights.
@@ -75,40 +75,6 @@ write_scene() {
         "receivers": [{"mesh": "lit.gltf", "objects": "floor", "size": 32, "output": "scene.exr"}]}\n' "$2" "${3:-}" >"$1"
 }
 
-@test "a scene takes the lights of a file among its own, as --lights takes them" {
-    write_lit lit.gltf "$(down 0 sun 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
-    write_scene scene.json '{"type": "file", "file": "lit.gltf", "angle_deg": 9, "radius": 0.25}'
-    succeed bake scene.json
-    succeed bake lit.gltf --lights file --sun-angle 9 --light-radius 0.25 --receive floor --size 32 -o line.exr
-    same scene.exr line.exr
-    mkdir -p elsewhere
-    write_lit elsewhere/lamps.gltf "$(down 0 spot 0,4,0)" "$SPOT"
-    write_scene scene.json '{"name": "first", "type": "directional", "direction": [0, 1, 0]},
-        {"type": "file", "file": "lit.gltf"}, {"type": "file", "file": "elsewhere/lamps.gltf"},
-        {"name": "last", "type": "directional", "direction": [0, 1, 0]}'
-    shade info scene.json
-    [ "$(grep -o "^light '[a-z]*'" <<<"$output" | tr -d '\n')" = "light 'first'light 'sun'light 'lamp'light 'spot'light 'last'" ] || fail "$output"
-    prints "light 'sun': directional towards 0 1 0, 0.529985" # the sun of the sky
-    succeed bake scene.json
-    info_tells scene.exr lamps.gltf
-}
-
-@test "layers know the lights of a file by name" {
-    write_lit lit.gltf "$(down 0 sun 0,7,0), $(down 1 lamp 1,3,0)" "$SUN,$LAMP"
-    printf '0 0.1 0\n' >points.xyz # in the plate's shadow by every light
-    layered() { # LAYER VALUES: more of the layer; what sun, lamp and own leave
-        printf '{"casters": [{"mesh": "lit.gltf", "objects": "floor"}, {"mesh": "lit.gltf", "objects": "plate", "layer": "plates"}],
-            "layers": [{"name": "plates"%s}], "lights": [{"type": "file", "file": "lit.gltf"},
-            {"name": "own", "type": "directional", "direction": [0, 1, 0]}]}' "$1" >scene.json
-        succeed query scene.json --points points.xyz -o answers.csv --answers-only
-        [ "$(cat answers.csv)" = "shadow.sun,shadow.lamp,shadow.own"$'\n'"$2" ] || fail "$(cat answers.csv)"
-    }
-    layered '' 0,0,0
-    layered ', "lights": ["lamp"]' 1,0,1
-    write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"layers": [{"name": "a", "lights": ["moon"]}],'
-    refuses 2 'layers[0].lights[0]: "moon" is none of the scene' -- bake scene.json
-}
-
 @test "render, query, volume and trade take the lights of a file" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
     printf '0 0.1 0\n-1.9 0.1 -1.9\n' >points.xyz
@@ -124,32 +90,17 @@ write_scene() {
     grep -q '^shadow,' out.csv || fail 'no shadow'
 }
 
-@test "--unit moves the lights of a scene's files with its meshes" {
+@test "--unit moves the lights of a file with the meshes" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
-    write_scene scene.json '{"name": "sky", "type": "directional", "direction": [0, 1, 0]}, {"type": "file", "file": "lit.gltf"}'
-    succeed bake scene.json --unit cm
+    write_scene scene.json '{"name": "sky", "type": "directional", "direction": [0, 1, 0]}'
+    succeed bake scene.json --lights lit.gltf --unit cm
     info_tells scene.exr 'vdbshade_light_lamp: sphere at 0.01 0.03 0,'
-    write_scene scene.json '{"type": "file", "file": "lit.gltf"}' '"unit": "mm",'
-    info_tells scene.json "light 'lamp': sphere at 0.001 0.003 0,"
 }
 
-@test "faults of a file of lights are refused with their place" {
+@test "a scene is no file of lights, and no output replaces one" {
     write_lit lit.gltf "$(down 0 lamp 1,3,0)" "$LAMP"
-    for one in '{"type": "file"}|lights[0]: key "file" is missing' \
-        '{"type": "file", "file": "box.obj"}|lights[0].file: box.obj has no lights' \
-        '{"type": "file", "file": "none.glb"}|none.glb' \
-        '{"type": "file", "file": "lit.gltf", "radius": -1}|lights[0].radius: -1 is out of range' \
-        '{"type": "file", "file": "lit.gltf", "angle_deg": 180}|lights[0].angle_deg: 180 is out of range' \
-        '{"type": "file", "file": "lit.gltf", "color": [1, 1, 1]}|lights[0].color: unknown key' \
-        '{"type": "file", "file": "lit.gltf"}, {"type": "file", "file": "lit.gltf"}|lights[1]: has a light "lamp", as lights[0] has' \
-        '{"type": "file", "file": "lit.gltf"}, {"name": "lamp", "type": "directional", "direction": [0, 1, 0]}|lights[1]: has a light "lamp", as lights[0]'; do
-        write_scene scene.json "${one%|*}"
-        shade bake scene.json
-        [[ $status -ge 2 && $stderr == *"${one#*|}"* ]] || fail "${one%|*}: $stderr"
-    done
-    write_scene scene.json '{"type": "file", "file": "lit.gltf"}'
+    write_scene scene.json '{"name": "sky", "type": "directional", "direction": [0, 1, 0]}'
     refuses 2 "--lights 'file': scene.json is a scene" -- bake scene.json --lights file
     cp lit.gltf lights.gltf
-    write_scene scene.json '{"type": "file", "file": "lights.gltf"}'
-    refuses 2 'lights.gltf: the output is also an input' -- bake scene.json -o lights.gltf
+    refuses 2 'lights.gltf: the output is also an input' -- bake scene.json --lights lights.gltf -o lights.gltf
 }

@@ -149,11 +149,9 @@ class Reach(Case):
         self.assertEqual((lamp.type, lamp.radius, lamp.name, lamp.color), ("sphere", 0.2, "lamp", (3.0, 3.0, 3.0)))
         self.assertEqual(vdbshade.lights_read(ASSETS / "cloister.glb", 0.1, 0.2), [])
         scene = self.folder / "lamp.json"
-        scene.write_text(json.dumps({"casters": [{"mesh": "lamp.gltf"}], "lights": [{"type": "file", "file": "lamp.gltf", "radius": 0.2}]}))
-        read = vdbshade.Scene(scene)
+        scene.write_text(json.dumps({"casters": [{"mesh": "lamp.gltf"}]}))
+        read = vdbshade.Scene(scene, lights=[lamp])
         self.assertEqual([repr(light) for light in read.lights], [repr(lamp)])
-        self.assertEqual([(f.radius, f.first, f.count) for f in read.light_files], [(0.2, 0, 1)])
-        self.assertEqual(vdbshade.Scene(scene, lights=[sun()]).light_files, [])
 
     def layers(self, terrain):
         vdbshade.image_write(self.folder / "terrain.exr", {"Y": terrain})

@@ -6,7 +6,7 @@
 
 static inline vsh_scene *parse(const char *path, const char *text) {
     vsh_scene *scene = NULL;
-    assert_ok(vshi_scene_parse(path, text, strlen(text), NULL, &scene, &failure));
+    assert_ok(vshi_scene_parse(path, text, strlen(text), &scene, &failure));
     assert_non_null(scene);
     return scene;
 }

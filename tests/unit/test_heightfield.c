@@ -624,7 +624,7 @@ static void bake_floor(const char *casters, float *shadow, float *coverage, int3
              casters);
     OWNED(vsh_scene) *scene = NULL;
     OWNED(vsh_assets) *assets = NULL;
-    assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), NULL, &scene, &failure));
+    assert_ok(vshi_scene_parse(VSH_ASSETS "/scene.json", text, strlen(text), &scene, &failure));
     assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
     vshi_layer layer = vshi_layer_default();
     layer.heights = vshi_assets_caster(assets, 0)->heights;

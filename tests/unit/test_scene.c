@@ -472,7 +472,7 @@ TEST(errors_name_line_column_and_key) {
         assert_true(snprintf(text, sizeof text, "%s%s%s", f->before, bad[i].part, f->after) <
                     (int)sizeof text);
         take_mark(text, message, expected, sizeof expected);
-        const vsh_result result = vshi_scene_parse("s.json", text, strlen(text), NULL, &scene, &failure);
+        const vsh_result result = vshi_scene_parse("s.json", text, strlen(text), &scene, &failure);
         if (result != VSH_ERROR_INPUT || scene != NULL || strcmp(failure.message, expected) != 0) {
             print_error("%s\n  expected %s\n  found    %s\n", text, expected, failure.message);
             ++wrong;
@@ -484,7 +484,7 @@ TEST(errors_name_line_column_and_key) {
 /* Parses text of any bytes; it must be refused with this in the message. */
 static void assert_refused(const char *text, size_t size, const char *message) {
     vsh_scene *scene = NULL;
-    assert_int_equal(vshi_scene_parse("s", text, size, NULL, &scene, &failure), VSH_ERROR_INPUT);
+    assert_int_equal(vshi_scene_parse("s", text, size, &scene, &failure), VSH_ERROR_INPUT);
     assert_null(scene);
     assert_that(strncmp(failure.message, "s:", 2) == 0 && strstr(failure.message, message) != NULL &&
                     strpbrk(failure.message, "\r\n") == NULL,

@@ -205,26 +205,6 @@ static double sun_angle(const cli_bake_settings *s) {
     return CLI_DEGREE * (cli_was_given("sun-angle") ? s->sun_angle_deg : sun_angle_default_deg);
 }
 
-/* Reads the positions of a scene's light files again: they were read by the scene's unit, and --unit gives
- * another. */
-static int move_lights(const cli_bake_settings *s, cli_bake_scene *made) {
-    for (size_t i = 0; i < made->scene.light_file_count; ++i) {
-        const vsh_light_file *file = &made->scene.light_files[i];
-        vsh_light *lights = NULL;
-        size_t count = 0;
-        CLI_TRY(cli_check(vsh_lights_read(file->path, file->angle, file->radius, made->scene.unit, &cli_run,
-                                          &lights, &count, &cli_error)));
-        const bool same = count == file->count;
-        for (size_t k = 0; same && k < count; ++k) {
-            memcpy(made->lights[file->first + k].position, lights[k].position, sizeof lights[k].position);
-        }
-        vsh_lights_free(lights);
-        CLI_REFUSE_IF(!same, "%s: its lights changed since %s was read; run this again", file->path,
-                      s->input);
-    }
-    return CLI_OK;
-}
-
 /* Joins the lights of the scene's file, the sun and the lights of another file. */
 static int join_lights(const cli_bake_settings *s, const vsh_light *others, size_t count,
                        cli_bake_scene *made) {
@@ -256,8 +236,7 @@ static int check_lights(const cli_bake_settings *s, const cli_bake_scene *made) 
     CLI_REFUSE_IF(cli_was_given("sun") && made->read != NULL,
                   "--sun: not for a scene; add the sun to \"lights\" in %s", s->input);
     CLI_REFUSE_IF(s->lights != NULL && made->read != NULL && strcmp(s->lights, CLI_LIGHTS_OF_INPUT) == 0,
-                  "--lights '%s': %s is a scene; name the file, or list it there under \"lights\"", s->lights,
-                  s->input);
+                  "--lights '%s': %s is a scene; name the file that has the lights", s->lights, s->input);
     CLI_REFUSE_IF(cli_was_given("sun-angle") && !cli_was_given("sun") && s->lights == NULL,
                   "--sun-angle: needs --sun X,Y,Z or --lights FILE");
     return cli_was_given("light-radius") && s->lights == NULL
@@ -267,7 +246,6 @@ static int check_lights(const cli_bake_settings *s, const cli_bake_scene *made) 
 
 /* Adds the sun and the lights of --lights to those of the scene's file. */
 static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
-    const bool moves = made->scene.light_file_count > 0 && cli_was_given("unit");
     vsh_light *others = NULL;
     size_t count = 0;
     int code;
@@ -280,11 +258,8 @@ static int add_lights(const cli_bake_settings *s, cli_bake_scene *made) {
             goto done;
         }
     }
-    if (cli_was_given("sun") || count > 0 || moves) {
+    if (cli_was_given("sun") || count > 0) {
         CLI_TRY_DONE(join_lights(s, others, count, made));
-    }
-    if (moves) {
-        CLI_TRY_DONE(move_lights(s, made));
     }
 done:
     vsh_lights_free(others);

@@ -305,7 +305,6 @@ class Scene(SceneFile, kind="vsh_scene"):
         given["casters"] = None if casters is None else [_caster_of(c) for c in casters]
         if lights is not None:
             given["lights"], given["light_count"] = lights_of(lights)
-            given["light_file_count"] = 0  # none of these are a file's
         given["layers"] = layers
         given["solidity"] = None if solidity is None else rules_of(solidity, "solidity")
         self._filled.fill(given)
@@ -324,11 +323,6 @@ class Scene(SceneFile, kind="vsh_scene"):
 
     def _receiver(self, index: int) -> Any:
         return self.struct.receivers + index
-
-    @property
-    def light_files(self) -> List[types.LightFile]:
-        """Files that its file reads lights from, and their lights' places among its own."""
-        return [record_of(self.struct.light_files[i]) for i in range(self.struct.light_file_count)]
 
     @property
     def layers(self) -> List[str]:
