@@ -617,23 +617,17 @@ typedef struct vsh_lit_image {
                          value, which goes into it. PREVIEW: factor before planes are cut at 1; 0: 1 */
 } vsh_lit_image;
 
-/* Where images go. */
-typedef enum vsh_lit_image_place {
-    VSH_LIT_IMAGES_AUTO = 0,   /* into a GLB, beside a glTF */
-    VSH_LIT_IMAGES_EMBED = 1,  /* into the buffer */
-    VSH_LIT_IMAGES_BESIDE = 2, /* OUT.PURPOSE.png; OUT.PURPOSE.PAGE.png for several or named pages */
-} vsh_lit_image_place;
-
 /* How a lit file is written. */
 typedef struct vsh_lit_options {
     size_t struct_size;
     const uint32_t *chart_pages; /* [chart_count]: page of each chart */
     size_t chart_count;
-    const vsh_lit_image *images; /* [image_count], in any order. Pages without images keep their materials */
+    /* [image_count], in any order: into a GLB, beside a glTF and an OBJ as OUT.PURPOSE.png, or
+     * OUT.PURPOSE.PAGE.png for several or named pages. Pages without images keep their materials */
+    const vsh_lit_image *images;
     size_t image_count;
-    vsh_lit_image_place image_place; /* where images go */
-    const char *const *page_names;   /* [page_count], UTF-8, as file names may be: part of image names, and of
-                                        their files. NULL, and NULL names: numbers */
+    const char *const *page_names; /* [page_count], UTF-8, as file names may be: part of image names, and of
+                                      their files. NULL, and NULL names: numbers */
     size_t page_count;
     /* [attribute_count]: provenance, in the extras of the document's asset, replacing earlier ones that begin
      * with "vdbshade_"; comments of an .obj */
@@ -642,8 +636,7 @@ typedef struct vsh_lit_options {
 } vsh_lit_options;
 
 static inline vsh_lit_options vsh_lit_options_default(void) {
-    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0,
-                               VSH_LIT_IMAGES_AUTO,     NULL, 0, NULL, 0};
+    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, NULL, 0, NULL, 0};
     return options;
 }
 

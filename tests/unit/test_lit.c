@@ -585,8 +585,7 @@ static asset make_scene(void) {
 }
 
 /* Lights a file, whose first object may be on a page of its own. */
-static void light_file(const char *in, int purposes, uint32_t pages, int32_t place, const char *out,
-                       const vsh_run *run) {
+static void light_file(const char *in, int purposes, uint32_t pages, const char *out, const vsh_run *run) {
     OWNED(vsh_model) *model = read_model(at(in));
     vsh_lit_mesh *lit = make_all_lit(model, true);
     lit[0].page = pages - 1;
@@ -598,7 +597,6 @@ static void light_file(const char *in, int purposes, uint32_t pages, int32_t pla
         }
     }
     vsh_lit_options options = options_of(images, count);
-    options.image_place = place;
     assert_ok(vsh_lit_write(at(in), model, lit, &options, at(out), run, &failure));
     keep_file(at(out));
     free_lit(lit, vsh_model_mesh_count(model));
@@ -606,7 +604,7 @@ static void light_file(const char *in, int purposes, uint32_t pages, int32_t pla
 
 static asset light_again(const asset *in, int purposes, uint32_t pages) {
     write_glb(in, "in.glb");
-    light_file("in.glb", purposes, pages, VSH_LIT_IMAGES_EMBED, "out.glb", NULL);
+    light_file("in.glb", purposes, pages, "out.glb", NULL);
     asset out = load_asset(at("out.glb"));
     remove_file("in.glb");
     remove_file("out.glb");
@@ -724,9 +722,9 @@ TEST(beside_an_extension_that_is_not_known_all_stays) {
 TEST(files_that_were_made_are_left_and_no_longer_named) {
     FREED_BY(free_asset) asset in = make_scene();
     write_glb(&in, "in.glb");
-    light_file("in.glb", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "lit.gltf", NULL);
+    light_file("in.glb", LIGHTMAP, 1, "lit.gltf", NULL);
     FREED_BY(free_asset) asset one = load_asset(at("lit.gltf"));
-    light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "again.gltf", NULL);
+    light_file("lit.gltf", LIGHTMAP, 1, "again.gltf", NULL);
     FREED_BY(free_asset) asset two = load_asset(at("again.gltf"));
     assert_counts(&one, &two, LISTS);
     assert_string_equal(text_at(&two, "images/2/uri"), "again.lightmap.png");
@@ -737,7 +735,7 @@ TEST(files_that_were_made_are_left_and_no_longer_named) {
     run.warning = keep_warning;
     warnings[0] = '\0';
     assert_int_equal(mkdir(at("other"), 0777), 0);
-    light_file("lit.gltf", LIGHTMAP, 1, VSH_LIT_IMAGES_BESIDE, "other/lit.gltf", &run);
+    light_file("lit.gltf", LIGHTMAP, 1, "other/lit.gltf", &run);
     assert_string_equal(warnings, "");
     FREED_BY(free_asset) asset far = load_asset(at("other/lit.gltf"));
     assert_string_equal(text_at(&far, "images/2/uri"), "lit.lightmap.png");

@@ -124,10 +124,6 @@ static bool is_file_name(const char *name) {
 static vsh_result check_images(const vsh_lit_options *options, vsh_error *error) {
     VSHI_NEEDS_OF(options->image_count, options->images);
     VSHI_NEEDS_OF(options->chart_count, options->chart_pages);
-    if ((uint32_t)options->image_place > VSH_LIT_IMAGES_BESIDE) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_lit_options.image_place is %d",
-                         options->image_place);
-    }
     for (size_t i = 0; i < options->image_count; ++i) {
         VSHI_TRY(check_image(&options->images[i], i, error));
         for (size_t k = 0; k < i; ++k) {
@@ -160,10 +156,6 @@ static vsh_result check_images(const vsh_lit_options *options, vsh_error *error)
 /* Refuses images that an OBJ cannot show. */
 static vsh_result check_obj(const vshi_lit_work *work, vsh_error *error) {
     const vsh_lit_options *options = work->options;
-    if (options->image_place == VSH_LIT_IMAGES_EMBED) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: an OBJ holds no images; they stand beside it",
-                         work->output);
-    }
     for (size_t i = 0; i < options->image_count; ++i) {
         if (options->images[i].purpose != VSH_LIT_PREVIEW) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
@@ -296,16 +288,14 @@ static vsh_result make_document(vshi_lit_work *work, vsh_error *error) {
 
 static vsh_result write_all(vshi_lit_work *work, vsh_error *error) {
     vshi_lit_besides besides = {NULL, 0};
-    const int32_t place = work->options->image_place;
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
-    const bool embed = place == VSH_LIT_IMAGES_EMBED || (place == VSH_LIT_IMAGES_AUTO && glb);
     vsh_result result;
     VSHI_TRY_DONE(vshi_check_limit(work->gltf.run, (double)work->page_count * sizeof *work->pages,
                                    work->output, error));
     VSHI_TRY_DONE(
         vshi_allocate((void **)&work->pages, work->page_count, sizeof *work->pages, "pages", error));
     VSHI_TRY_DONE(make_document(work, error));
-    VSHI_TRY_DONE(vshi_lit_add_images(work, embed, &besides, error));
+    VSHI_TRY_DONE(vshi_lit_add_images(work, glb, &besides, error));
     if (!vshi_lit_is_obj(work->output)) {
         VSHI_TRY_DONE(vshi_lit_apply_materials(work, error));
         VSHI_TRY_DONE(vshi_lit_prune(work, error));

@@ -121,8 +121,7 @@ class LitImage(Struct, kind="vsh_lit_image"):
 
 
 def lit_write(output: Path, model: Model, images: Sequence[LitImage], *, path: Optional[Path] = None,
-              atlas: Optional[Atlas] = None, uv_sets: Optional[Sequence[int]] = None, image_place: str = "auto",
-              run: Optional[Run] = None) -> None:
+              atlas: Optional[Atlas] = None, uv_sets: Optional[Sequence[int]] = None, run: Optional[Run] = None) -> None:
     """Writes a .glb or .gltf with its light (docs/lit.md).
 
     Parameters
@@ -136,12 +135,10 @@ def lit_write(output: Path, model: Model, images: Sequence[LitImage], *, path: O
         new UVs of the model's meshes; None: they have their lightmap in a set of their own
     uv_sets : sequence of int, optional
         without an atlas: the set of each mesh; -1: it stays unlit; None: as Model.mesh() chooses
-    image_place : str
-        "auto", "embed", "beside"
     """
     if not isinstance(model, Model):
         raise TypeError(f"model: expected a vdbshade.Model, got {type(model).__name__}")
-    options = Filled("vsh_lit_options", image_place=image_place, images=images)
+    options = Filled("vsh_lit_options", images=images)
     meshes = None
     if atlas is not None:
         if len(atlas) != len(model):
