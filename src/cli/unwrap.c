@@ -1,6 +1,5 @@
 /* vdbshade unwrap: lightmap UVs for the meshes of a file. */
 #include "base/clock.h"
-#include "base/text.h"
 #include "cli.h"
 
 typedef struct unwrap_settings {
@@ -62,51 +61,12 @@ static int set_options(unwrap_settings *s) {
 
 /* --- the mesh file */
 
-enum { NAME_BYTES = 120 }; /* longest name of a page */
-
-/* Returns the name of a mesh's object, or NULL if file names cannot hold it. */
-static const char *page_name(const vsh_mesh *mesh) {
-    const char *name = mesh->object_name != NULL ? mesh->object_name : mesh->name;
-    const size_t size = name != NULL ? strlen(name) : 0;
-    bool good = size > 0 && size <= NAME_BYTES;
-    for (size_t i = 0, length; i < size && good; i += length) {
-        length = vshi_utf8_length(name + i);
-        good = length > 0 && (unsigned char)name[i] >= ' ' && strchr("/\\\x7f", name[i]) == NULL;
-    }
-    return good ? name : NULL;
-}
-
-/* Gives each page the name of the object on it, unless another page has it. */
-static void name_pages(const vsh_mesh *meshes, const vsh_atlas *atlas, const char **names) {
-    const vsh_atlas_chart *charts = vsh_atlas_charts(atlas);
-    vsh_atlas_info info;
-    vsh_atlas_get_info(atlas, &info);
-    for (size_t i = 0; i < info.meshes; ++i) {
-        const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, i);
-        const char *name = page_name(&meshes[i]);
-        size_t t = 0;
-        while (t < placed.triangle_count && placed.charts[t] == VSH_NO_CHART) {
-            ++t;
-        }
-        if (t < placed.triangle_count && name != NULL) {
-            const uint32_t page = charts[placed.charts[t]].page;
-            bool taken = names[page] != NULL;
-            for (size_t p = 0; p < info.pages && !taken; ++p) {
-                taken = names[p] != NULL && strcmp(names[p], name) == 0;
-            }
-            names[page] = taken ? names[page] : name;
-        }
-    }
-}
-
 /* Writes the model with the UVs of the atlas. */
-static int write_model(const unwrap_settings *s, const vsh_model *model, const vsh_mesh *meshes,
-                       const vsh_atlas *atlas) {
+static int write_model(const unwrap_settings *s, const vsh_model *model, const vsh_atlas *atlas) {
     vsh_lit_options lit = vsh_lit_options_default();
     vsh_atlas_info info;
     vsh_atlas_get_info(atlas, &info);
     vsh_lit_mesh *places = calloc(info.meshes + 1, sizeof *places);
-    const char **names = calloc((size_t)info.pages + 1, sizeof *names);
     uint32_t *pages = calloc(info.charts + 1, sizeof *pages);
     for (size_t i = 0; i < info.meshes; ++i) {
         const vsh_atlas_mesh placed = vsh_atlas_mesh_view(atlas, i);
@@ -117,11 +77,6 @@ static int write_model(const unwrap_settings *s, const vsh_model *model, const v
                                    .vertex_count = placed.vertex_count,
                                    .triangle_count = placed.triangle_count};
     }
-    if (s->options.atlas == VSH_ATLAS_OBJECTS) {
-        name_pages(meshes, atlas, names);
-        lit.page_names = names;
-        lit.page_count = info.pages;
-    }
     lit.chart_pages = pages;
     lit.chart_count = (size_t)info.charts;
     for (size_t i = 0; i < lit.chart_count; ++i) {
@@ -129,7 +84,6 @@ static int write_model(const unwrap_settings *s, const vsh_model *model, const v
     }
     const vsh_result result = vsh_lit_write(s->input, model, places, &lit, s->output, &cli_run, &cli_error);
     free(pages);
-    free((void *)names);
     free(places);
     return cli_check_input(result);
 }
@@ -154,7 +108,7 @@ static int unwrap(unwrap_settings *s) {
     CLI_TRY_DONE(cli_check_input(
         vsh_model_densities(model, s->input, s->densities.list, s->densities.count, density, &cli_error)));
     CLI_TRY_DONE(cli_check_input(vsh_unwrap(meshes, count, &s->options, &cli_run, &atlas, &cli_error)));
-    CLI_TRY_DONE(write_model(s, model, meshes, atlas));
+    CLI_TRY_DONE(write_model(s, model, atlas));
     cli_signals_end(CLI_OK);
     vsh_atlas_info info;
     vsh_atlas_get_info(atlas, &info);
