@@ -210,41 +210,9 @@ static void state_caster(json_t *casters, const vsh_caster *caster, size_t index
           "caster %zu: %s%s\n", index, type, file);
 }
 
-/* Returns false if the file is no flat scene. */
-static bool state_flat(json_t *root, const char *path) {
-    static const char *const types[] = {"mask", "text", "box"};
-    vsh_flat_scene *scene = NULL;
-    if (vsh_flat_scene_read(path, &cli_run, &scene, NULL) != VSH_OK) {
-        return false;
-    }
-    const vsh_flat_options *o = &scene->options;
-    state(root, "flat",
-          json_pack("{s:[f,f,f,f],s:o}", "region", o->region_min[0], o->region_min[1], o->region_max[0],
-                    o->region_max[1], "size", size_of(o->width, o->height)),
-          "flat scene: %g %g to %g %g, %d × %d\n", o->region_min[0], o->region_min[1], o->region_max[0],
-          o->region_max[1], o->width, o->height);
-    json_t *casters = add(root, "casters", json_array()), *lights = add(root, "lights", json_array());
-    for (size_t i = 0; i < scene->caster_count; ++i) {
-        const char *file = scene->casters[i].path, *type = types[scene->casters[i].type];
-        state(casters, NULL, json_pack("{s:s,s:o}", "type", type, "file", cli_utf8_json(file)),
-              "caster %zu: %s%s%s\n", i, type, file != NULL ? " " : "", file != NULL ? file : "");
-    }
-    for (size_t i = 0; i < scene->light_count; ++i) {
-        const char *name = scene->lights[i].name;
-        const char *type = vsh_get_name(VSH_NAMES_FLAT_LIGHT, scene->lights[i].type);
-        state(lights, NULL, json_pack("{s:o,s:s}", "name", cli_utf8_json(name), "light", type),
-              "light '%s': %s\n", name, type);
-    }
-    vsh_flat_scene_free(scene);
-    return true;
-}
-
 static int state_scene(json_t *root, const char *path) {
     vsh_scene *scene = NULL;
-    const vsh_result result = vsh_scene_read(path, &cli_run, &scene, &cli_error);
-    if (result != VSH_OK) {
-        return result == VSH_ERROR_INPUT && state_flat(root, path) ? CLI_OK : cli_check(result);
-    }
+    CLI_TRY(cli_check(vsh_scene_read(path, &cli_run, &scene, &cli_error)));
     json_t *casters = add(root, "casters", json_array()), *layers = add(root, "layers", json_array());
     json_t *lights = add(root, "lights", json_array()), *receivers = add(root, "receivers", json_array());
     for (size_t i = 0; i < scene->caster_count; ++i) {

@@ -7,8 +7,6 @@
 #include "base/clock.h"
 #include "base/memory.h"
 
-#include <time.h>
-
 enum { MOST_RESOLUTIONS = 16, LEAST_RESOLUTION = 2, MOST_RESOLUTION = 65536 };
 
 /* RMSE of shadow and AO on assets/cloister.glb between such a truth, with 1024 rays, and 4096 Embree rays a
@@ -137,17 +135,6 @@ static const cli_option options[] = {
 
 /* --- the scene */
 
-/* Returns seconds for differences. One thread's are processor time, which ignores other work on the machine.
- */
-static double read_clock(void) {
-    if (cli_run.threads != 1) {
-        return vshi_seconds();
-    }
-    struct timespec now = {0, 0};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
 static int load(trade_work *work) {
     const vsh_scene *scene = work->scene;
     CLI_TRY(cli_check_input(vsh_assets_load(scene, &cli_run, &work->assets, &cli_error)));
@@ -269,11 +256,11 @@ static int make_truth(trade_work *work) {
     CLI_TRY(make_occluders(work, &exact, true, false, &work->truth));
     CLI_TRY(drop_invalid(work, work->truth));
     CLI_TRY(make_fields(work, &exact));
-    const double start = read_clock();
+    const double start = vshi_seconds();
     for (size_t s = 0; s < work->subject_count; ++s) {
         CLI_TRY(bake(work, &work->subjects[s], work->truth, &exact.shade, work->subjects[s].truth));
     }
-    work->truth_s = read_clock() - start;
+    work->truth_s = vshi_seconds() - start;
     return CLI_OK;
 }
 
@@ -299,9 +286,9 @@ static int measure_run(const trade_work *work, trade_subject *subject, const vsh
                        const vsh_shade_options *shade, trade_run *run) {
     run->bake_s = INFINITY;
     for (int i = 0; i < REPEATS && (i == 0 || run->bake_s < SHORT_SECONDS); ++i) {
-        const double start = read_clock();
+        const double start = vshi_seconds();
         CLI_TRY(bake(work, subject, occluders, shade, work->values));
-        run->bake_s = fmin(run->bake_s, read_clock() - start);
+        run->bake_s = fmin(run->bake_s, vshi_seconds() - start);
     }
     run->rate = 1e6 * run->bake_s / (double)(subject->planes * work->points);
     CLI_TRY(compare(work, subject, &run->error));
@@ -615,11 +602,11 @@ static void write_conditions(FILE *out, const trade_work *work) {
         "little.</p>\n",
         work->points, work->covered, truth_max_error, work->settings->truth_rays, work->truth_s,
         truth_error[0], truth_error[1]);
-    fprintf(out,
-            "<p>Time: %s; the shortest of three bakes if they are short. A bake finds the valid texels, "
-            "places the "
-            "origins of rays, and shades. A value is one light at one texel, or the AO of one texel.</p>\n",
-            cli_run.threads == 1 ? "processor time of one thread" : "wall time of all threads");
+    fputs(
+        "<p>Time: wall time of all threads; the shortest of three bakes if they are short. A bake finds the "
+        "valid texels, places the origins of rays, and shades. A value is one light at one texel, or the AO "
+        "of one texel.</p>\n",
+        out);
     if (work->skipped > 0) {
         fprintf(out,
                 "<p>%zu runs did not fit into the budget of %g s; <code>--budget</code> gives more.</p>\n",

@@ -37,14 +37,14 @@ JSON
     cmp one.exr seven.exr
 }
 
-@test "options go over the scene's, and info describes it" {
+@test "options go over the scene's" {
     succeed_saying "small.png: 32 × 16, 2 lights" -- flat wall.json -o small.png --size 32x16 --bits 8 --pack R=shadow.sun --stats stats.json
     info_tells small.png "32 × 16"
     grep -q '"texels": 512' stats.json
     sed -i 's/"padding": 0/"padding": 0, "output": "own.exr"/' wall.json
     succeed flat wall.json --quiet
     [ -s own.exr ]
-    succeed_printing "flat scene: -2 -2 to 2 2, 64 × 64" "caster 0: box" "light 'lamp': disc" -- info wall.json
+    refuses 2 "region" "which 'vdbshade flat' bakes" -- info wall.json
 }
 
 # spoil FROM TO: bad.json, the scene with one thing changed.
