@@ -50,7 +50,7 @@ static bool is_outside(const vshi_field_error *of, const double position[3], con
     const vshi_truth *truth = &of->truth;
     uint8_t where = VSHI_OUTSIDE;
     if (truth->triangles != NULL) {
-        vshi_inside(truth->triangles, 1, position, normal, NULL, NULL, NULL, &where);
+        vshi_inside(truth->triangles, 1, position, normal, NULL, NULL, &where);
     }
     double at[3];
     for (int k = 0; k < 3; ++k) {

@@ -81,20 +81,6 @@ static void test_in_field(const lifting *l, size_t field, size_t first, size_t l
     }
 }
 
-/* Samples that are traced, from `first` on. */
-typedef struct tracing {
-    const lifting *lifting;
-    const vshi_probed_field *in;
-    size_t first;
-} tracing;
-
-/* A vshi_open_fn: only the sample's own surface is near, and the field knows solids. */
-static bool is_open(const void *user, size_t i) {
-    const tracing *t = user;
-    const vshi_vec at = probe(t->lifting, t->in, t->first + i);
-    return t->in->field->voxel_size * vshi_distance_at(t->in->field, at) >= CREASE * t->in->probe;
-}
-
 /* The end of the samples that are tested together from `first` on: those of a cell. */
 static size_t together_end(const vshi_samples *samples, size_t first) {
     const uint32_t *texel = samples->texel;
@@ -149,20 +135,22 @@ static void drop_touching(const lifting *l, const vshi_triangles *triangles, siz
     }
 }
 
-/* Tests samples first … last - 1 together, by rays against a field's triangles. */
+/* Tests samples first … last - 1 together, by rays against a field's triangles. The field knows a sample to
+ * be in the open if only the sample's own surface is near. */
 static void test_by_rays(const lifting *l, const vshi_probed_field *in, size_t first, size_t last) {
     double at[3 * TOGETHER];
+    vshi_vec probes[TOGETHER];
     uint8_t where[TOGETHER];
     bool follows[TOGETHER];
     size_t i = first;
     do {
         vshi_vec_to_doubles(vshi_sample_foot(l->samples, i), at + 3 * (i - first));
+        probes[i - first] = probe(l, in, i);
         follows[i - first] =
             i > first && ((l->samples->mesh[i] | l->samples->mesh[i - 1]) & VSHI_SAMPLE_BORDER) == 0;
     } while (++i < last);
-    const tracing task = {l, in, first};
-    vshi_inside(in->triangles, last - first, at, l->samples->geometric + 3 * first, follows, is_open, &task,
-                where);
+    const vshi_open_field open = {in->field, probes, CREASE * in->probe};
+    vshi_inside(in->triangles, last - first, at, l->samples->geometric + 3 * first, follows, &open, where);
     for (i = first; i < last; ++i) {
         if (where[i - first] != VSHI_OUTSIDE) {
             l->origins->valid[i] = 0;

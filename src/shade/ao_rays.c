@@ -303,22 +303,10 @@ static bool prepare(const ray_piece *b, size_t i, point_rays *point, vsh_shade_s
     return true;
 }
 
-/* Points of a piece that are tested for solids. */
-typedef struct solid_test {
-    const vshi_ao_task *task;
-    const point_rays *points;
-    uint32_t of[VSHI_AO_GRAIN]; /* numbers in the piece */
-} solid_test;
-
-/* A vshi_open_fn. */
-static bool is_open(const void *user, size_t i) {
-    const solid_test *l = user;
-    return vshi_distance_at(l->task->field, l->points[l->of[i]].frame.origin) >= OPEN;
-}
-
 /* Finds points in solids. They see nothing, even if all triangles are farther than the AO distance. */
 static void find_buried(const vshi_ao_task *task, size_t all, point_rays *points) {
-    solid_test l = {.task = task, .points = points};
+    vshi_vec at[VSHI_AO_GRAIN];
+    uint32_t of[VSHI_AO_GRAIN]; /* numbers of the tested points */
     double positions[3 * VSHI_AO_GRAIN] = {0.0};
     float normals[3 * VSHI_AO_GRAIN] = {0.0f};
     uint8_t where[VSHI_AO_GRAIN];
@@ -330,16 +318,18 @@ static void find_buried(const vshi_ao_task *task, size_t all, point_rays *points
             if (!task->sphere) {
                 memcpy(normals + 3 * count, task->points->normals + 3 * i, 3 * sizeof(float));
             }
-            l.of[count++] = (uint32_t)k;
+            at[count] = points[k].frame.origin;
+            of[count++] = (uint32_t)k;
         }
     }
-    vshi_inside(task->triangles, count, positions, normals, NULL, is_open, &l, where);
+    const vshi_open_field open = {task->field, at, OPEN * task->field->voxel_size};
+    vshi_inside(task->triangles, count, positions, normals, NULL, &open, where);
     for (size_t k = 0; k < count; ++k) {
-        const size_t i = points[l.of[k]].index;
+        const size_t i = points[of[k]].index;
         if (where[k] == VSHI_OUTSIDE) {
             continue;
         }
-        points[l.of[k]].next = 0;
+        points[of[k]].next = 0;
         task->ao[i] = 0.0f;
         if (task->deviation != NULL) {
             task->deviation[i] = 0.0f;

@@ -58,9 +58,8 @@ typedef struct solid_test {
     const double *positions; /* [count][3] */
     const float *normals;
     double offset;
-    bool holes; /* solids have holes: a ray that escapes proves nothing */
-    vshi_open_fn *open;
-    const void *user;
+    bool holes;                  /* solids have holes: a ray that escapes proves nothing */
+    const vshi_open_field *open; /* NULL: none */
 } solid_test;
 
 /* The origin of a point's rays. */
@@ -154,6 +153,13 @@ static uint8_t confirm(const solid_test *l, size_t point) {
     return VSHI_INSIDE;
 }
 
+/* Whether the field knows that a point is in the open. */
+static bool is_open(const solid_test *l, size_t point) {
+    const vshi_open_field *open = l->open;
+    return open != NULL &&
+           open->field->voxel_size * vshi_distance_at(open->field, open->at[point]) >= open->least;
+}
+
 /* Tests the listed points. */
 static void test_points(const solid_test *l, const size_t *points, size_t count, uint8_t *where) {
     vshi_segment_ray rays[FIRST * AT_ONCE];
@@ -177,7 +183,7 @@ static void test_points(const solid_test *l, const size_t *points, size_t count,
         const int inside = met[VSHI_MEETS_SOLID] + met[VSHI_MEETS_HOLED];
         if (inside == FIRST) {
             where[point] = met[VSHI_MEETS_HOLED] > 0 ? confirm(l, point) : VSHI_INSIDE;
-        } else if (inside == 0 && ((escapes && !l->holes) || (l->open != NULL && l->open(l->user, point)))) {
+        } else if (inside == 0 && ((escapes && !l->holes) || is_open(l, point))) {
             where[point] = VSHI_OUTSIDE;
         } else {
             where[point] = count_through(l, point);
@@ -294,14 +300,14 @@ static void find_hidden(const solid_test *l, size_t first, size_t count, uint8_t
 }
 
 void vshi_inside(const vshi_triangles *triangles, size_t count, const double *positions, const float *normals,
-                 const bool *follows, vshi_open_fn *open, const void *user, uint8_t *where) {
+                 const bool *follows, const vshi_open_field *open, uint8_t *where) {
     memset(where, VSHI_OUTSIDE, count);
     if (!vshi_triangles_have_solids(triangles)) {
         return;
     }
     const solid_test l = {
         triangles, positions, normals, vshi_triangles_offset(triangles), vshi_triangles_have_holes(triangles),
-        open,      user};
+        open};
     for (size_t first = 0; first < count; first += AT_ONCE) {
         const size_t some = count - first < AT_ONCE ? count - first : AT_ONCE;
         test_linked(&l, follows, first, some, where);

@@ -152,15 +152,19 @@ vshi_vec vshi_lift_find(const vshi_lifter *lifter, const vshi_lift_point *point)
 
 enum { VSHI_OUTSIDE = 0, VSHI_INSIDE = 1 };
 
-/* Whether another source knows that point `i` is in the open. Called only if a few rays leave doubt. */
-typedef bool vshi_open_fn(const void *user, size_t i);
+/* A field that tells points in the open: places at least so far from all casters. */
+typedef struct vshi_open_field {
+    const vsh_field *field;
+    const vshi_vec *at; /* [points]: near them, field space */
+    double least;       /* world units */
+} vshi_open_field;
 
 /* Tests `count` points [count][3] on surfaces, a hair above them along their normals [count][3] (unit, or
- * zero for any direction). Writes where[count]. `open` may be NULL. follows[count]: whether a point is next
- * to the one before it on a surface. The two then share a result unless a triangle parts them. NULL: each
- * result depends on its point alone. Thread safe. */
+ * zero for any direction). Writes where[count]. `open`, which may be NULL, decides where a few rays leave
+ * doubt. follows[count]: whether a point is next to the one before it on a surface. The two then share a
+ * result unless a triangle parts them. NULL: each result depends on its point alone. Thread safe. */
 void vshi_inside(const vshi_triangles *triangles, size_t count, const double *positions, const float *normals,
-                 const bool *follows, vshi_open_fn *open, const void *user, uint8_t *where);
+                 const bool *follows, const vshi_open_field *open, uint8_t *where);
 
 /* --- chunks of cones: set up in double precision, marched, read back (rays.c) */
 

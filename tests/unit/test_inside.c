@@ -33,8 +33,7 @@ static counts compare(const vsh_mesh *meshes, size_t mesh_count, int32_t size) {
             continue;
         }
         uint8_t where;
-        vshi_inside(triangles, 1, samples->position + 3 * i, samples->geometric + 3 * i, NULL, NULL, NULL,
-                    &where);
+        vshi_inside(triangles, 1, samples->position + 3 * i, samples->geometric + 3 * i, NULL, NULL, &where);
         const bool valid = coverage[vsh_texel_place(samples->texel[i], size)] == 1.0f;
         ++found.samples;
         found.invalid += where != VSHI_OUTSIDE;

@@ -559,7 +559,7 @@ static void assert_mesh_hides(const vsh_mesh *mesh, const double at[][3], size_t
     OWNED(vshi_triangles) *triangles = triangles_from(mesh, 1);
     for (size_t i = 0; i < count; ++i) {
         uint8_t where;
-        vshi_inside(triangles, 1, at[i], (const float[]){0, 0, 1}, NULL, NULL, NULL, &where);
+        vshi_inside(triangles, 1, at[i], (const float[]){0, 0, 1}, NULL, NULL, &where);
         assert_that((where == VSHI_INSIDE) == hidden, "%s: point (%g, %g, %g) is %s", mesh->name, at[i][0],
                     at[i][1], at[i][2], hidden ? "not hidden" : "hidden");
     }
