@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <vdbshade/light.h>
 
 /* --- UTF-8 */
 
@@ -89,6 +90,34 @@ int32_t vsh_find_name(vsh_names kind, const char *name) {
         }
     }
     return -1;
+}
+
+/* --- traits of methods, in the same order */
+
+enum {
+    INNER = VSH_METHOD_INNER,
+    RAYS = VSH_METHOD_RAYS,
+    KEEPS = VSH_METHOD_RAYS | VSH_METHOD_KEEPS_ERROR,
+    TRACES = VSH_METHOD_RAYS | VSH_METHOD_KEEPS_ERROR | VSH_METHOD_TRIANGLES,
+};
+
+static const uint32_t shadow_traits[] = {
+    [VSH_SHADOW_SMOOTH] = INNER,         [VSH_SHADOW_CONE] = INNER,
+    [VSH_SHADOW_RAYS] = RAYS | INNER,    [VSH_SHADOW_ADAPTIVE] = KEEPS | INNER,
+    [VSH_SHADOW_EXACT] = TRACES | INNER, [VSH_SHADOW_AUTO] = KEEPS | INNER,
+};
+static const uint32_t ao_traits[] = {
+    [VSH_AO_RAYS] = RAYS,
+    [VSH_AO_ADAPTIVE] = KEEPS,
+    [VSH_AO_EXACT] = TRACES,
+    [VSH_AO_AUTO] = KEEPS,
+};
+
+uint32_t vsh_method_traits(vsh_names kind, int32_t method) {
+    const bool known = vsh_get_name(kind, method) != NULL;
+    return known && kind == VSH_NAMES_SHADOW ? shadow_traits[method]
+           : known && kind == VSH_NAMES_AO   ? ao_traits[method]
+                                             : 0;
 }
 
 /* --- misspelt words */

@@ -10,9 +10,8 @@
 #include "field/field.h"
 #include "geometry/mesh_set.h"
 #include "light/light.h"
-#include "light/method.h"
 #include "lightmap/planes.h"
-#include "shade/occluders.h"
+#include "shade/shade.h"
 
 #include <math.h>
 #include <stdio.h>

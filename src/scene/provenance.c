@@ -6,8 +6,8 @@
 #include "base/memory.h"
 #include "base/text.h"
 #include "io/model/model.h"
-#include "light/method.h"
 #include "scene/scene.h"
+#include "shade/shade.h"
 
 #include <math.h>
 #include <stdio.h>

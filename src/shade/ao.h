@@ -2,7 +2,6 @@
  */
 #pragma once
 
-#include "light/method.h"
 #include "shade/shade.h"
 #include "shade/window.h"
 

@@ -7,7 +7,6 @@
 #include "base/parallel.h"
 #include "field/field.h"
 #include "field/level.h"
-#include "light/method.h"
 #include "shade/layers.h"
 #include "trace/embree.h"
 
@@ -80,9 +79,8 @@ vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shad
 }
 
 void vshi_shade_options_settle(vsh_shade_options *full, const vshi_triangles *triangles) {
-    const int32_t has_triangles = triangles != NULL;
-    full->method = vshi_shadow_method_resolve(full->method, has_triangles);
-    full->ao_method = vshi_ao_method_resolve(full->ao_method, has_triangles);
+    full->method = vshi_shadow_method_resolve(full->method, triangles != NULL);
+    full->ao_method = vshi_ao_method_resolve(full->ao_method, triangles != NULL);
     const bool fixed = full->method == VSH_SHADOW_RAYS || full->ao_method == VSH_AO_RAYS;
     if (full->sampler == VSH_SAMPLER_BLUE && full->max_error < VSHI_COARSE && !fixed) {
         full->sampler = VSH_SAMPLER_SOBOL;

@@ -57,6 +57,16 @@ vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *
 
 /* --- options and statistics */
 
+/* Resolves auto by whether there are triangles. Other methods stay. */
+static inline int32_t vshi_shadow_method_resolve(int32_t method, bool has_triangles) {
+    const int32_t best = has_triangles ? VSH_SHADOW_EXACT : VSH_SHADOW_ADAPTIVE;
+    return method == VSH_SHADOW_AUTO ? best : method;
+}
+static inline int32_t vshi_ao_method_resolve(int32_t method, bool has_triangles) {
+    const int32_t best = has_triangles ? VSH_AO_EXACT : VSH_AO_ADAPTIVE;
+    return method == VSH_AO_AUTO ? best : method;
+}
+
 /* Tinted visibility, linear RGB, into rgb[count][3]; NaN stays. The tint must have passed vshi_tint_check().
  * Runs on the calling thread. */
 void vshi_shade_tint(size_t count, const float *visibility, const vsh_tint *tint, float *rgb);

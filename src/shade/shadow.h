@@ -3,7 +3,6 @@
 #pragma once
 
 #include "light/light.h"
-#include "light/method.h"
 #include "shade/shade.h"
 
 /* A light as the points of one field see it, then the kernel and arrays of a call. */

@@ -37,7 +37,6 @@ VSH_END_C
 #include "io/lit/work.h"
 #include "io/model/model.h"
 #include "levelset/access.h"
-#include "light/method.h"
 #include "lightmap/planes.h"
 #include "lightmap/texels.h"
 #include "scene/assets.h"
