@@ -91,12 +91,18 @@ static vsh_result check_spot(const vsh_light *light, vsh_error *error) {
 
 /* --- the tables */
 
-static const vshi_light_type types[] = {
-    [VSH_LIGHT_DIRECTIONAL] = {"directional", false, place_sun, sun_gain, describe_sun, resize_sun, NULL},
-    [VSH_LIGHT_SPHERE] = {"sphere", true, place_lamp, lamp_gain, describe_lamp, resize_lamp, NULL},
-    [VSH_LIGHT_SPOT] = {"spot", true, place_lamp, spot_gain, describe_spot, resize_lamp, check_spot},
-    [VSH_LIGHT_RECTANGLE] = {"rectangle", true, vshi_rectangle_place, vshi_rectangle_gain,
-                             vshi_rectangle_describe, vshi_rectangle_resize, vshi_rectangle_check},
+static const vshi_light_type sun = {"directional", false,      place_sun, sun_gain,
+                                    describe_sun,  resize_sun, NULL};
+static const vshi_light_type sphere = {"sphere",      true,        place_lamp, lamp_gain,
+                                       describe_lamp, resize_lamp, NULL};
+static const vshi_light_type spot = {"spot",        true,        place_lamp, spot_gain,
+                                     describe_spot, resize_lamp, check_spot};
+
+static const vshi_light_type *const types[] = {
+    [VSH_LIGHT_DIRECTIONAL] = &sun,
+    [VSH_LIGHT_SPHERE] = &sphere,
+    [VSH_LIGHT_SPOT] = &spot,
+    [VSH_LIGHT_RECTANGLE] = &vshi_rectangle_type,
 };
 
 enum {
@@ -108,13 +114,13 @@ enum {
 };
 
 const vshi_light_type *vshi_light_type_of(int32_t type) {
-    return type >= 0 && type < TYPES ? &types[type] : NULL;
+    return type >= 0 && type < TYPES ? types[type] : NULL;
 }
 
 uint32_t vshi_light_types_falling(void) {
     uint32_t bits = 0;
     for (int32_t i = 0; i < TYPES; ++i) {
-        bits |= types[i].falls_off ? 1U << i : 0;
+        bits |= types[i]->falls_off ? 1U << i : 0;
     }
     return bits;
 }
@@ -246,20 +252,20 @@ double vshi_light_falloff(const vsh_light *light, double distance) {
 }
 
 double vshi_light_gain(const vsh_light *light, vshi_vec to_light, double distance) {
-    return types[light->type].gain(light, to_light, distance);
+    return types[light->type]->gain(light, to_light, distance);
 }
 
 vsh_light vshi_light_resized(const vsh_light *light, double factor) {
     vsh_light resized = *light;
     if (factor != 1.0) {
-        types[light->type].resize(&resized, factor);
+        types[light->type]->resize(&resized, factor);
     }
     return resized;
 }
 
 vshi_light_place vshi_light_in_world(const vsh_light *light) {
     vshi_light_place place;
-    types[light->type].place(light, &place);
+    types[light->type]->place(light, &place);
     place.reach = light->falloff == VSH_FALLOFF_QUADRATIC ? light->reach : INFINITY;
     place.outer = INFINITY;
     place.rim = -INFINITY;
@@ -297,15 +303,15 @@ vshi_light_place vshi_light_moved(const vshi_light_place *place, const double ma
     moved.radius = place->radius / unit;
     moved.reach = place->reach / unit;
     moved.beam = vshi_unit(vshi_transform_vector(matrix, place->beam));
-    if (place->is_rectangle) {
-        vshi_rectangle_move(&moved, matrix, unit);
+    if (place->shape != NULL) {
+        place->shape->move(&moved, matrix, unit);
     }
     return moved;
 }
 
 void vsh_light_text(const vsh_light *light, char *text, size_t size) {
     VSHI_NUMBERS;
-    const vshi_light_type *type = &types[light->type];
+    const vshi_light_type *type = types[light->type];
     const double *c = light->color;
     char shape[256] = "", color[80] = "", falloff[48] = "";
     type->describe(light, shape, sizeof shape);

@@ -22,20 +22,22 @@ static inline double vshi_light_sine(double sine) {
     return sine < VSHI_LEAST_SINE ? 0.0 : fmin(sine, VSHI_LARGEST_SINE);
 }
 
+typedef struct vshi_light_shape vshi_light_shape;
+
 /* A light's place and size. Only directional lights have the members `towards` to `tangent`. */
 typedef struct vshi_light_place {
-    bool parallel;    /* directional: the same from everywhere */
-    vshi_vec towards; /* unit */
-    double half;      /* the half angle */
-    double sine;      /* of the half angle */
-    double tangent;   /* of the half angle */
-    vshi_vec centre;  /* not directional */
-    double radius;    /* of the sphere around the whole light; 0 for directional lights */
-    double reach;     /* of a quadratic falloff; else infinite */
-    vshi_vec beam;    /* spot: unit, the way it shines */
-    double outer;     /* spot: half angle of its cone; else infinite */
-    double rim;       /* its cosine; else -infinite */
-    bool is_rectangle;
+    bool parallel;                  /* directional: the same from everywhere */
+    vshi_vec towards;               /* unit */
+    double half;                    /* the half angle */
+    double sine;                    /* of the half angle */
+    double tangent;                 /* of the half angle */
+    vshi_vec centre;                /* not directional */
+    double radius;                  /* of the sphere around the whole light; 0 for directional lights */
+    double reach;                   /* of a quadratic falloff; else infinite */
+    vshi_vec beam;                  /* spot: unit, the way it shines */
+    double outer;                   /* spot: half angle of its cone; else infinite */
+    double rim;                     /* its cosine; else -infinite */
+    const vshi_light_shape *shape;  /* NULL: every point sees a disc */
     vshi_vec x, y, normal;          /* rectangle: unit, along its sides, and the way it shines */
     double half_width, half_height; /* rectangle: half of its sides */
     bool two_sided;                 /* rectangle: shines both ways */
@@ -66,7 +68,7 @@ typedef enum vshi_light_side {
     VSHI_LIGHT_SEEN
 } vshi_light_side;
 
-/* A rectangle as a point sees it, for rays: see light/rectangle.c. */
+/* A rectangle as a point sees it, for rays: see rectangle.c. */
 typedef struct vshi_light_patch {
     double x[2], y[2], height;
     vshi_vec down;
@@ -74,8 +76,8 @@ typedef struct vshi_light_patch {
     double b0, b1, k;
 } vshi_light_patch;
 
-/* Methods of one march see a sphere: the light itself, or for a rectangle the sphere of the same solid angle
- * whose cone ends before the rectangle. Proofs see a cone around the whole light. */
+/* Methods of one march see a sphere: the light itself, or for another shape the sphere of the same solid
+ * angle whose cone ends before the light. Proofs see a cone around the whole light. */
 typedef struct vshi_light_view {
     vshi_vec axis;          /* unit, towards the light's middle */
     double distance;        /* of the sphere's centre; INFINITY for directional lights */
@@ -86,19 +88,20 @@ typedef struct vshi_light_view {
     vshi_light_patch patch; /* of rectangles */
 } vshi_light_view;
 
-/* Finds a rectangle's view. `hard`: a point at its centre. The view is set only if the light is seen. */
-vshi_light_side vshi_rectangle_look(const vshi_light_place *place, vshi_vec from, bool hard,
-                                    vshi_light_view *view);
-
-/* The vector from the point of a view to a place on the rectangle. It maps the unit disc to the rectangle,
- * uniform in solid angle, and ends a hair before the light. */
-vshi_vec vshi_rectangle_ray(const vshi_light_place *place, const vshi_light_view *view, const double disc[2]);
-
-/* Fraction of the rectangle's solid angle above the plane with a normal. */
-double vshi_rectangle_above(const vshi_light_place *place, vshi_vec from, vshi_vec normal);
-
-/* Whether every point of a ball may see the rectangle. */
-bool vshi_rectangle_faces(const vshi_light_place *place, vshi_vec centre, double radius);
+/* A shape that is no disc, as points see it. */
+struct vshi_light_shape {
+    /* Finds the view. `hard`: a point at the light's centre. The view is set only if the light is seen. */
+    vshi_light_side (*look)(const vshi_light_place *place, vshi_vec from, bool hard, vshi_light_view *view);
+    /* The vector from the point of a view to a place on the light. It maps the unit disc to the light,
+     * uniform in solid angle, and ends a hair before the light. */
+    vshi_vec (*ray)(const vshi_light_place *place, const vshi_light_view *view, const double disc[2]);
+    /* Fraction of the light's solid angle above the plane with a normal. */
+    double (*above)(const vshi_light_place *place, vshi_vec from, vshi_vec normal);
+    /* Whether every point of a ball may see the light. */
+    bool (*faces)(const vshi_light_place *place, vshi_vec centre, double radius);
+    /* Moves the shape's own members: see vshi_light_moved(). */
+    void (*move)(vshi_light_place *place, const double matrix[12], double unit);
+};
 
 /* Unit vector to the light's centre, and the distance (INFINITY for directional lights). */
 static inline double vshi_light_towards(const vshi_light_place *place, vshi_vec from, vshi_vec *axis) {
@@ -116,12 +119,12 @@ static inline double vshi_light_end(const vshi_light_view *view) {
     return isfinite(view->distance) ? view->distance * (1.0 - view->sine * view->sine) : INFINITY;
 }
 
-/* Finds the light's view. It is set only if the light is seen. `hard` changes only rectangles: callers who
- * want a disc without size use a sine of 0. */
+/* Finds the light's view. It is set only if the light is seen. `hard` changes no disc: callers who want one
+ * without size use a sine of 0. */
 static inline vshi_light_side vshi_light_look(const vshi_light_place *place, vshi_vec from, bool hard,
                                               vshi_light_view *view) {
-    if (place->is_rectangle) {
-        return vshi_rectangle_look(place, from, hard, view);
+    if (place->shape != NULL) {
+        return place->shape->look(place, from, hard, view);
     }
     view->distance = view->near = view->end = vshi_light_towards(place, from, &view->axis);
     view->sine = view->bound = place->sine;
@@ -180,6 +183,8 @@ typedef struct vshi_light_type {
     vsh_result (*check)(const vsh_light *light, vsh_error *error);
 } vshi_light_type;
 
+extern const vshi_light_type vshi_rectangle_type; /* rectangle.c */
+
 /* NULL: there is no such type. */
 const vshi_light_type *vshi_light_type_of(int32_t type);
 
@@ -211,13 +216,3 @@ typedef struct vshi_light_member {
 
 extern const vshi_light_member vshi_light_members[];
 extern const size_t vshi_light_member_count;
-
-/* The columns of rectangles in the table (rectangle.c). */
-void vshi_rectangle_place(const vsh_light *light, vshi_light_place *place);
-double vshi_rectangle_gain(const vsh_light *light, vshi_vec to_light, double distance);
-int vshi_rectangle_describe(const vsh_light *light, char *text, size_t size);
-void vshi_rectangle_resize(vsh_light *light, double factor);
-vsh_result vshi_rectangle_check(const vsh_light *light, vsh_error *error);
-
-/* Moves a rectangle's own members: see vshi_light_moved(). */
-void vshi_rectangle_move(vshi_light_place *place, const double matrix[12], double unit);

@@ -125,8 +125,7 @@ static void bound(const vshi_light_place *place, const vshi_light_patch *s, cons
     view->bound = cosine > WIDEST ? sine * (1.0 + ROOM) : INFINITY;
 }
 
-vshi_light_side vshi_rectangle_look(const vshi_light_place *place, vshi_vec from, bool hard,
-                                    vshi_light_view *view) {
+static vshi_light_side look(const vshi_light_place *place, vshi_vec from, bool hard, vshi_light_view *view) {
     double over;
     const vshi_light_patch s = see(place, from, &over);
     if (!place->two_sided && !(over > 0.0)) {
@@ -199,8 +198,7 @@ static flat_point place_by_angle(const vshi_light_patch *p, const double square[
     return (flat_point){x, clamp(h * d / sqrt(fmax(1.0 - h * h, 1e-30)), p->y)};
 }
 
-vshi_vec vshi_rectangle_ray(const vshi_light_place *place, const vshi_light_view *view,
-                            const double disc[2]) {
+static vshi_vec aim_ray(const vshi_light_place *place, const vshi_light_view *view, const double disc[2]) {
     const vshi_light_patch *p = &view->patch;
     double square[2];
     to_square(disc, square);
@@ -230,7 +228,7 @@ static int clip(const flat_point corners[4], const double level[4], flat_point k
     return count;
 }
 
-double vshi_rectangle_above(const vshi_light_place *place, vshi_vec from, vshi_vec normal) {
+static double share_above(const vshi_light_place *place, vshi_vec from, vshi_vec normal) {
     double over, level[4];
     const vshi_light_patch s = see(place, from, &over);
     flat_point corners[4], kept[5];
@@ -248,11 +246,11 @@ double vshi_rectangle_above(const vshi_light_place *place, vshi_vec from, vshi_v
     return fmin(part, 1.0);
 }
 
-bool vshi_rectangle_faces(const vshi_light_place *place, vshi_vec centre, double radius) {
+static bool faces(const vshi_light_place *place, vshi_vec centre, double radius) {
     return place->two_sided || vshi_dot(vshi_sub(centre, place->centre), place->normal) > radius;
 }
 
-void vshi_rectangle_move(vshi_light_place *place, const double matrix[12], double unit) {
+static void move(vshi_light_place *place, const double matrix[12], double unit) {
     place->x = vshi_unit(vshi_transform_vector(matrix, place->x));
     place->y = vshi_unit(vshi_transform_vector(matrix, place->y));
     place->normal = vshi_unit(vshi_transform_vector(matrix, place->normal));
@@ -260,13 +258,15 @@ void vshi_rectangle_move(vshi_light_place *place, const double matrix[12], doubl
     place->half_height /= unit;
 }
 
-/* --- the row of the table */
+/* --- the table's row */
 
-void vshi_rectangle_place(const vsh_light *light, vshi_light_place *place) {
+static const vshi_light_shape shape = {look, aim_ray, share_above, faces, move};
+
+static void set_place(const vsh_light *light, vshi_light_place *place) {
     const vshi_vec u = vshi_vec_of(light->edge_u), v = vshi_vec_of(light->edge_v), x = vshi_unit(u);
     const vshi_vec y = vshi_unit(vshi_sub(v, vshi_scale(x, vshi_dot(v, x))));
     *place = (vshi_light_place){.centre = vshi_vec_of(light->position),
-                                .is_rectangle = true,
+                                .shape = &shape,
                                 .x = x,
                                 .y = y,
                                 .normal = vshi_cross(x, y),
@@ -278,9 +278,9 @@ void vshi_rectangle_place(const vsh_light *light, vshi_light_place *place) {
 
 /* A plane surface shines by the cosine. The inverse square, integrated over its parts, is the solid angle
  * over the area. */
-double vshi_rectangle_gain(const vsh_light *light, vshi_vec to_light, double distance) {
+static double find_gain(const vsh_light *light, vshi_vec to_light, double distance) {
     vshi_light_place place;
-    vshi_rectangle_place(light, &place);
+    set_place(light, &place);
     const double cosine = -vshi_dot(to_light, place.normal), facing = place.two_sided ? fabs(cosine) : cosine;
     if (!(facing > 0.0)) {
         return 0.0;
@@ -295,14 +295,14 @@ double vshi_rectangle_gain(const vsh_light *light, vshi_vec to_light, double dis
     return polygon_angle(s.height, corners, 4) / (4.0 * place.half_width * place.half_height);
 }
 
-int vshi_rectangle_describe(const vsh_light *light, char *text, size_t size) {
+static int describe(const vsh_light *light, char *text, size_t size) {
     const double *p = light->position, *u = light->edge_u, *v = light->edge_v;
     return snprintf(text, size, "rectangle at %.9g %.9g %.9g, sides %.9g %.9g %.9g and %.9g %.9g %.9g, %s",
                     p[0], p[1], p[2], u[0], u[1], u[2], v[0], v[1], v[2],
                     light->two_sided != 0 ? "two-sided" : "one-sided");
 }
 
-void vshi_rectangle_resize(vsh_light *light, double factor) {
+static void resize(vsh_light *light, double factor) {
     const double by = fmax(factor, LEAST_FACTOR);
     for (int axis = 0; axis < 3; ++axis) {
         light->edge_u[axis] *= by;
@@ -310,7 +310,7 @@ void vshi_rectangle_resize(vsh_light *light, double factor) {
     }
 }
 
-vsh_result vshi_rectangle_check(const vsh_light *light, vsh_error *error) {
+static vsh_result check(const vsh_light *light, vsh_error *error) {
     const vshi_vec u = vshi_vec_of(light->edge_u), v = vshi_vec_of(light->edge_v);
     const double lengths[2] = {vshi_length(u), vshi_length(v)};
     for (int i = 0; i < 2; ++i) {
@@ -329,3 +329,6 @@ vsh_result vshi_rectangle_check(const vsh_light *light, vsh_error *error) {
     }
     return VSH_OK;
 }
+
+const vshi_light_type vshi_rectangle_type = {"rectangle", true,   set_place, find_gain,
+                                             describe,    resize, check};

@@ -107,7 +107,7 @@ static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam,
     }
     /* one march aims at the rectangle's disc, not at the sphere around the rectangle */
     const bool hard = task->options.method == VSH_SHADOW_HARD;
-    if (task->place.is_rectangle && !hard && !vshi_shadow_has_rays(&task->options)) {
+    if (task->place.shape != NULL && !hard && !vshi_shadow_has_rays(&task->options)) {
         return false;
     }
     const vshi_vec to = vshi_sub(task->place.centre, beam->origin);
@@ -122,7 +122,7 @@ static bool aim_at(const vshi_shadow_task *task, double radius, vshi_cone *beam,
 }
 
 static double tilt_of(const vshi_shadow_task *task, const vshi_facing *facing, const block *b) {
-    if (!task->place.is_rectangle) {
+    if (task->place.shape == NULL) {
         return b->beam.wide / b->distance;
     }
     double square = 0.0;
@@ -224,7 +224,7 @@ static void shorten(const vshi_shadow_task *task, vshi_facing *facing, const blo
 static bool hides_all(const vshi_shadow_task *task, const block *b, double t) {
     if (vshi_shadow_has_rays(&task->options)) {
         /* a solid in the beam may stand behind a part of the rectangle */
-        return !task->place.is_rectangle || t <= b->distance - task->place.radius - below(task);
+        return task->place.shape == NULL || t <= b->distance - task->place.radius - below(task);
     }
     return t + DEEPER * fmax(1.0, b->beam.sine * t) <= b->ends;
 }
@@ -306,7 +306,7 @@ void vshi_blocks_prove(const vshi_shadow_task *task, vshi_facing *facing, vshi_c
 static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radius, vshi_cone *beam) {
     const bool hard = task->options.method == VSH_SHADOW_HARD;
     *beam = (vshi_cone){.origin = centre, .wide = radius + 1e-3, .end = INFINITY};
-    if (task->place.is_rectangle && !vshi_rectangle_faces(&task->place, centre, beam->wide)) {
+    if (task->place.shape != NULL && !task->place.shape->faces(&task->place, centre, beam->wide)) {
         return false;
     }
     double distance;
@@ -315,7 +315,7 @@ static bool aim_ball(const vshi_shadow_task *task, vshi_vec centre, double radiu
     }
     if (distance > 0.0) {
         /* no cone extends beyond the lamp's middle, or the end of a rectangle */
-        beam->end = distance + beam->wide + (task->place.is_rectangle ? task->place.radius : 0.0);
+        beam->end = distance + beam->wide + (task->place.shape != NULL ? task->place.radius : 0.0);
     }
     return true;
 }

@@ -91,9 +91,9 @@ double vshi_shadow_above(const vshi_shadow_task *task, size_t i) {
         return 1.0;
     }
     const vshi_vec normal = vshi_direction_to_field(task->field, vshi_vec_off(points->normals + 3 * i));
-    if (task->place.is_rectangle && vshi_shadow_has_rays(&task->options)) {
-        return vshi_rectangle_above(&task->place, vshi_to_field(task->field, points->positions + 3 * i),
-                                    normal);
+    if (task->place.shape != NULL && vshi_shadow_has_rays(&task->options)) {
+        return task->place.shape->above(&task->place, vshi_to_field(task->field, points->positions + 3 * i),
+                                        normal);
     }
     const double sine = vshi_dot(normal, cone.direction);
     return (double)remap(task->options.method, sine < cone.sine || cone.sine <= 0.0 ? sine : cone.sine,

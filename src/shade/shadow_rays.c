@@ -99,12 +99,12 @@ static bool direct(const vshi_shadow_task *task, const open_point *p, const doub
                    double *end) {
     const bool horizon = task->points->normals != NULL;
     *end = p->end;
-    if (!task->place.is_rectangle) {
+    if (task->place.shape == NULL) {
         *d = vshi_unit(vshi_add(p->axis, vshi_add(vshi_scale(p->u, disc[0]), vshi_scale(p->v, disc[1]))));
         return !(horizon && vshi_dot(*d, p->normal) <= 0.0);
     }
     const bool traced = task->options.method == VSH_SHADOW_EXACT;
-    const vshi_vec way = vshi_rectangle_ray(traced ? &task->world : &task->place, &p->view, disc);
+    const vshi_vec way = task->place.shape->ray(traced ? &task->world : &task->place, &p->view, disc);
     const vshi_vec to = vshi_sub(way, p->off);
     const double length = vshi_length(to), ahead = vshi_dot(to, p->axis);
     *d = vshi_unit(to);
@@ -198,7 +198,7 @@ static void begin_open_point(const vshi_shadow_task *task, size_t point, const v
         const vshi_vec from = begin_of(task, p);
         p->near = vshi_triangles_sees(traced_of(task), (double[]){from.x, from.y, from.z});
     }
-    if (task->place.is_rectangle) {
+    if (task->place.shape != NULL) {
         const bool exact = task->options.method == VSH_SHADOW_EXACT;
         const double *at = task->points->positions + 3 * p->point;
         const vshi_vec from = exact ? vshi_vec_of(at) : vshi_to_field(task->field, at);
@@ -211,7 +211,7 @@ static void begin_open_point(const vshi_shadow_task *task, size_t point, const v
  * is a disc, and the rays are whole blocks of Sobol's sequence. */
 static void cast_alike(ray_batch *batch, const size_t *some, size_t count, int32_t taken, int32_t target) {
     const vshi_shadow_task *task = batch->task;
-    const bool packets = !task->place.is_rectangle && task->options.sampler == VSH_SAMPLER_SOBOL &&
+    const bool packets = task->place.shape == NULL && task->options.sampler == VSH_SAMPLER_SOBOL &&
                          !is_hard(task) && vshi_sampler_is_blocks(taken, target);
     size_t alike[VSHI_PIECE], same = 0;
     for (size_t i = 0; i < count; ++i) {
@@ -466,7 +466,7 @@ static void prove(ray_batch *batch, vshi_facing *facing) {
         const size_t i = batch->chunk.owner[r];
         const uint8_t proof = (uint8_t)batch->chunk.proof[r];
         /* a solid in the cone may stand behind a part of the rectangle */
-        const bool is_full = proof == VSHI_PROVED_FULL && !task->leaky && !task->place.is_rectangle;
+        const bool is_full = proof == VSHI_PROVED_FULL && !task->leaky && task->place.shape == NULL;
         if (proof == VSHI_PROVED_FREE || is_full) {
             vshi_shadow_settle(task, facing->point[i], proof == VSHI_PROVED_FREE ? 1.0f : 0.0f, 0.0f);
             facing->settled[i] = true;

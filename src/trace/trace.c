@@ -49,8 +49,8 @@ static double find_length(const target *t, double cosine) {
 static bool aim_ray(const vshi_truth *truth, const target *t, const double disc[2], const vshi_vec *normal,
                     vshi_segment_ray *ray) {
     vshi_vec d;
-    if (truth->place.is_rectangle) { /* a light that is no disc */
-        const vshi_vec way = vshi_rectangle_ray(&truth->place, &t->view, disc);
+    if (truth->place.shape != NULL) { /* a light that is no disc */
+        const vshi_vec way = truth->place.shape->ray(&truth->place, &t->view, disc);
         d = vshi_unit(way);
         ray->far = vshi_length(way);
     } else {
@@ -86,7 +86,7 @@ static vshi_cone_state prove(const vshi_truth *truth, vshi_vec origin, const tar
                                                                            : VSHI_CONE_UNKNOWN;
     }
     const double axis[3] = {t->axis.x, t->axis.y, t->axis.z}, bound = t->view.bound;
-    if (!truth->place.is_rectangle) {
+    if (truth->place.shape == NULL) {
         return vshi_solids_cone(truth->solids, from, axis, t->radius, t->distance - t->size, t->distance);
     }
     return isfinite(bound) ? vshi_solids_cone(truth->solids, from, axis, bound / sqrt(1.0 - bound * bound),
