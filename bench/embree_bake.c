@@ -11,7 +11,6 @@
 #include "common.h"
 #include "embree_rays.h"
 #include "field/field.h"
-#include "lightmap/origins.h"
 #include "lightmap/page.h"
 #include "scene/assets.h"
 #include "scene/bake_scene.h"
@@ -266,7 +265,7 @@ int main(int argc, char **argv) {
     vshi_occluder_parts parts = {.field = NULL};
     parts.triangles = triangles;
     parts.field = field_of_nothing_known(triangles);
-    bench_check(vshi_occluders_from_parts(&parts, &occluders, &error), &error);
+    bench_check(vshi_occluders_make(&parts, NULL, &occluders, &error), &error);
     vsh_shade_options exact = vsh_shade_options_default();
     exact.method = VSH_SHADOW_EXACT;
     exact.ao_method = VSH_AO_EXACT;

@@ -2,8 +2,8 @@
 #pragma once
 
 #include "light/light.h"
-#include "trace/embree.h"
 #include "trace/sampler.h"
+#include "trace/trace.h"
 
 /* Shades successive texels: visible fraction of a light, or AO. */
 typedef struct bench_rays_task {

@@ -1,4 +1,4 @@
-/* Prints the table of src/shade/ao_cones.c and its remaining errors. The table gives the open share of an AO
+/* Prints the table of src/shade/ao.c and its remaining errors. The table gives the open share of an AO
  * cone from its closest approach to the casters and from the openness of its neighbours, fitted to analytic
  * rays. The scenes (boxes, slats, spheres, closed rooms) measure nothing else. Run it after a change of the
  * cones' directions or widths. Cones march the field without vshi_shade_grown(): fitted with it, sixteen

@@ -79,7 +79,7 @@ static vsh_occluders *make_occluders(const vsh_field *field, const vshi_triangle
     vshi_occluder_parts parts = {.field = NULL};
     parts.field = field;
     parts.triangles = triangles;
-    bench_check(vshi_occluders_from_parts(&parts, &occluders, &error), &error);
+    bench_check(vshi_occluders_make(&parts, NULL, &occluders, &error), &error);
     return occluders;
 }
 
@@ -353,7 +353,7 @@ static void measure_asset(FILE *csv) {
     question.towards = NULL;
     question.distance = AO_DISTANCE;
     ray = measure_embree(csv, "cloister", mesh, &question, truth, r.valid, values);
-    bench_check(vshi_triangles_create(meshes, mesh_count, &run, &triangles, &error), &error);
+    bench_check(vshi_triangles_create(meshes, mesh_count, NULL, &run, &triangles, &error), &error);
     vsh_occluders *traced = make_occluders(field, triangles);
     const struct {
         const char *name;

@@ -3,7 +3,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "geometry/mesh.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <stdlib.h>

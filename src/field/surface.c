@@ -2,7 +2,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -333,7 +333,7 @@ vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, floa
                     .planes = planes,
                     .bent = bent};
     vshi_job *job;
-    VSHI_TRY(vshi_begin_stage(run, "ao", rows, &job, error));
+    VSHI_TRY(vshi_job_open(&job, run, "ao", rows, "ao", error));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&s.sums, rows, sizeof *s.sums, "AO texels", error));
     VSHI_TRY_DONE(run_estimate(&s, page->charts->ao_spacing, job, error));

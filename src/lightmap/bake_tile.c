@@ -2,11 +2,9 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
-#include "lightmap/origins.h"
 #include "lightmap/page.h"
 #include "lightmap/planes.h"
 #include "shade/ao.h"
-#include "shade/layers.h"
 #include "shade/shadow.h"
 
 #include <math.h>

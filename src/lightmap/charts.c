@@ -384,7 +384,7 @@ vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vs
     VSHI_TRY_DONE(vshi_allocate((void **)&reports, mesh_count, sizeof *reports, "UV reports", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
     const size_t columns = (size_t)full.width / VSHI_TILE + 1, rows = (size_t)full.height / VSHI_TILE + 1;
-    VSHI_TRY_DONE(vshi_begin_stage(&full_run, "charts", columns * rows, &job, error));
+    VSHI_TRY_DONE(vshi_job_open(&job, &full_run, "charts", columns * rows, "charts", error));
     made->info.width = full.width;
     made->info.height = full.height;
     VSHI_TRY_DONE(vshi_meshes_tighten(meshes, mesh_count, &made->tight, error));

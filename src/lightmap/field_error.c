@@ -8,7 +8,7 @@
 #include "base/bytes.h"
 #include "shade/ao.h"
 #include "shade/shade.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 

@@ -284,7 +284,7 @@ static vsh_result find_and_fill(hiding *h, const vsh_run *run, vsh_error *error)
         return VSH_OK;
     }
     vshi_job *job;
-    VSHI_TRY(vshi_begin_stage(run, what, h->hidden_count, &job, error));
+    VSHI_TRY(vshi_job_open(&job, run, what, h->hidden_count, what, error));
     const vsh_result result = vshi_parallel_for(job, h->hidden_count, 256, 1, find_sources, h, error);
     vshi_job_end(job);
     VSHI_TRY(result);

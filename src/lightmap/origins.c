@@ -1,11 +1,10 @@
 /* Which samples of a tile are valid, and where their rays begin. */
-#include "lightmap/origins.h"
 #include "base/memory.h"
+#include "lightmap/page.h"
 #include "shade/ao.h"
 #include "shade/kernel/march.h"
-#include "shade/layers.h"
-#include "shade/shade.h"
-#include "trace/embree.h"
+#include "shade/shadow.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <stdlib.h>

@@ -122,7 +122,7 @@ vsh_result vshi_padding_fill(vshi_store *store, const vsh_run *run, int32_t widt
     const size_t strips = (f.width + STRIP - 1) / STRIP;
     /* Columns and rows report progress in texels. */
     vshi_job *job;
-    VSHI_TRY(vshi_begin_stage(run, "padding", f.width * f.height * 2, &job, error));
+    VSHI_TRY(vshi_job_open(&job, run, "padding", f.width * f.height * 2, "padding", error));
     vsh_result result;
     VSHI_TRY_DONE(
         vshi_store_take(store, (void **)&f.down, f.width * f.height, sizeof *f.down, "padding", error));
@@ -365,7 +365,7 @@ vsh_result vshi_pull_push(vshi_store *store, const vsh_run *run, int32_t width, 
         return VSH_OK;
     }
     pulling p = {.store = store};
-    VSHI_TRY(vshi_begin_stage(run, "padding", (size_t)height * plane_count, &p.job, error));
+    VSHI_TRY(vshi_job_open(&p.job, run, "padding", (size_t)height * plane_count, "padding", error));
     vsh_result result = VSH_OK;
     for (size_t i = 0; i < plane_count && result == VSH_OK; ++i) {
         const level finest = {(size_t)width, (size_t)height, planes[i].values, filled};

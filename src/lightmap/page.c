@@ -399,7 +399,7 @@ static vsh_result bake(const vshi_tracer *tracer, const vsh_charts *charts, cons
     vsh_result result;
     VSHI_TRY_DONE(vshi_page_open(charts, lightmap, light_count, shade,
                                  vshi_tracer_shares(tracer, charts->ao_spacing), &store, &page, error));
-    VSHI_TRY_DONE(vshi_begin_stage(run, "bake", tiles, &job, error));
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "bake", tiles, "bake", error));
     VSHI_TRY_DONE(vshi_trace_tiles(tracer, &page, NULL, tiles, job, error));
     result = vshi_page_finish(&page, run, stats, error);
 done:

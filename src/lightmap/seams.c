@@ -791,7 +791,7 @@ vsh_result vsh_lightmaps_stitch(const vsh_stitch_page *pages, size_t page_count,
     VSHI_TRY(vshi_check_ranges(ranges, sizeof ranges / sizeof *ranges, error));
     stitching s = {.options = &own, .pages = pages, .page_count = page_count};
     VSHI_TRY(check_pages(&s, light_count, &full, error));
-    VSHI_TRY(vshi_begin_stage(&full, "seams", s.channel_count + 1, &s.job, error));
+    VSHI_TRY(vshi_job_open(&s.job, &full, "seams", s.channel_count + 1, "seams", error));
     vsh_stitch_report found = {0};
     const vsh_result result = stitch(&s, light_count, &full, &found, error);
     vshi_job_end(s.job);

@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <vdbshade/lightmap.h>
 
-/* --- conservative rasterisation of UV triangles over cells, exact and watertight (raster.c) */
+/* --- conservative rasterisation of UV triangles over cells, exact and watertight (tile.c) */
 
 enum {
     VSHI_CELL = 8, /* texels along a cell: its 64 texels are the bits of a mask, row by row */
@@ -52,32 +52,6 @@ typedef struct vshi_cell {
     uint32_t nearest[VSHI_CELL * VSHI_CELL]; /* of border texels: the nearest triangle */
     double distance[VSHI_CELL * VSHI_CELL];  /* its squared distance to the centre, texels² */
 } vshi_cell;
-
-/* Empties a cell. */
-void vshi_cell_begin(const vshi_raster *raster, size_t column, size_t row, vshi_cell *cell);
-
-/* Texels of a cell where a triangle finds taken samples. A shared edge is no overlap. */
-typedef struct vshi_cell_overlap {
-    uint64_t texels;
-    uint64_t others; /* texels of these with a sample of another object's triangle */
-} vshi_cell_overlap;
-
-/* Gives the free samples inside triangle `index` to it (top-left rule, so that one triangle gets a shared
- * edge). */
-vshi_cell_overlap vshi_cell_cover(const vshi_raster *raster, const vshi_uv_triangle *triangles,
-                                  uint32_t index, vshi_cell *cell);
-
-/* Adds texels without covered samples that triangle `index` reaches as border texels. Called in the order of
- * the triangles after all have covered, so that the first of equally near ones stays. */
-void vshi_cell_touch(const vshi_raster *raster, const vshi_uv_triangle *triangles, uint32_t index,
-                     vshi_cell *cell);
-
-/* Barycentric coordinates of a point of the image, clamped into the triangle. */
-void vshi_uv_barycentric(const vshi_uv_triangle *triangle, double x, double y, double weight[3]);
-
-/* Centroid of the part of the triangle within half a texel, along both axes, of its point nearest to (x, y),
- * which is outside it. */
-void vshi_uv_centroid_near(const vshi_uv_triangle *triangle, double x, double y, double weight[3]);
 
 /* --- charts: the triangles of several meshes as one list, sorted into the tiles that they reach (charts.c)
  */

@@ -4,8 +4,357 @@
 #include "base/memory.h"
 #include "shade/shade.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* --- conservative rasterisation of UV triangles over cells, exact and watertight
+ *
+ * Edge functions after Pineda, "A Parallel Algorithm for Polygon Rasterization" (1988), with the top-left
+ * rule. Corners are rounded to an integer grid of 2^21 steps between two samples. Every sign on it is exact
+ * in 128 bits: a sample belongs to exactly one of the triangles around an edge or a corner. The grid holds
+ * UVs up to some 10^5 squares away. Farther corners are clamped, since their shape no longer shows in the
+ * image. */
+
+typedef __int128 exact; /* products of two differences of grid coordinates: below 2^123 */
+
+enum { HALF_BITS = 20 }; /* half the distance between samples is 2^20 steps of the grid */
+#define HALF_STEP ((int64_t)1 << HALF_BITS)
+#define FARTHEST 17179869184.0 /* 2^34 texels: times 2^25 steps a texel (16 samples) stays below 2^60 */
+
+static int64_t texel_steps(const vshi_raster *raster) {
+    return 2 * HALF_STEP * raster->supersample;
+}
+
+static double clamp_far(double x) {
+    return x < -FARTHEST ? -FARTHEST : x > FARTHEST ? FARTHEST : x;
+}
+
+static int64_t floor_divide(int64_t a, int64_t b) {
+    const int64_t quotient = a / b;
+    return a % b < 0 ? quotient - 1 : quotient;
+}
+
+static int64_t least(const int64_t v[3]) {
+    const int64_t m = v[0] < v[1] ? v[0] : v[1];
+    return m < v[2] ? m : v[2];
+}
+
+static int64_t greatest(const int64_t v[3]) {
+    const int64_t m = v[0] > v[1] ? v[0] : v[1];
+    return m > v[2] ? m : v[2];
+}
+
+/* Twice the signed area of (corner i, corner i + 1, point): positive on the inner side. */
+static exact edge_at(const vshi_uv_triangle *t, int i, int64_t x, int64_t y) {
+    const int j = (i + 1) % 3;
+    return (exact)(t->grid_x[j] - t->grid_x[i]) * (y - t->grid_y[i]) -
+           (exact)(t->grid_y[j] - t->grid_y[i]) * (x - t->grid_x[i]);
+}
+
+bool vshi_uv_triangle_set(const vshi_raster *raster, const float *uv[3], vshi_uv_triangle *triangle) {
+    const double steps = (double)texel_steps(raster);
+    for (int k = 0; k < 3; ++k) {
+        triangle->x[k] = clamp_far((double)uv[k][0] * raster->width);
+        triangle->y[k] = clamp_far((1.0 - (double)uv[k][1]) * raster->height);
+        triangle->grid_x[k] = (int64_t)floor(triangle->x[k] * steps + 0.5);
+        triangle->grid_y[k] = (int64_t)floor(triangle->y[k] * steps + 0.5);
+    }
+    const exact area = edge_at(triangle, 0, triangle->grid_x[2], triangle->grid_y[2]);
+    if (area < 0) {
+        const int64_t x = triangle->grid_x[1], y = triangle->grid_y[1];
+        triangle->grid_x[1] = triangle->grid_x[2];
+        triangle->grid_y[1] = triangle->grid_y[2];
+        triangle->grid_x[2] = x;
+        triangle->grid_y[2] = y;
+    }
+    return area != 0;
+}
+
+bool vshi_uv_cell_rows(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t *begin,
+                       size_t *end) {
+    const int64_t steps = texel_steps(raster);
+    int64_t top = least(triangle->grid_y), bottom = greatest(triangle->grid_y);
+    if (greatest(triangle->grid_x) <= 0 || least(triangle->grid_x) >= steps * raster->width || bottom <= 0 ||
+        top >= steps * raster->height) {
+        return false;
+    }
+    top = top > 0 ? top : 0;
+    bottom = bottom < steps * raster->height ? bottom : steps * raster->height;
+    *begin = (size_t)(top / (steps * VSHI_CELL));
+    *end = (size_t)((bottom - 1) / (steps * VSHI_CELL)) + 1;
+    return true;
+}
+
+void vshi_uv_cells(const vshi_raster *raster, const vshi_uv_triangle *triangle, size_t row, size_t *begin,
+                   size_t *end) {
+    /* Room for the rounding of the corners to the grid and of the clipping below; texels. */
+    const double room = 0.01;
+    const double top = (double)row * VSHI_CELL - room;
+    const double bottom = (double)(row + 1) * VSHI_CELL + room;
+    double left = INFINITY, right = -INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        const double x0 = triangle->x[i], y0 = triangle->y[i];
+        const double x1 = triangle->x[j], y1 = triangle->y[j];
+        if (y0 >= top && y0 <= bottom) {
+            left = fmin(left, x0);
+            right = fmax(right, x0);
+        }
+        const double line[2] = {top, bottom};
+        for (int k = 0; k < 2; ++k) {
+            if ((y0 < line[k]) != (y1 < line[k])) {
+                const double x = x0 + (x1 - x0) * ((line[k] - y0) / (y1 - y0));
+                left = fmin(left, x);
+                right = fmax(right, x);
+            }
+        }
+    }
+    left = (left - room) / VSHI_CELL;
+    right = (right + room) / VSHI_CELL;
+    const size_t cells = ((size_t)raster->width + VSHI_CELL - 1) / VSHI_CELL;
+    *begin = left > 0.0 ? (left < (double)cells ? (size_t)left : cells) : 0;
+    *end = right >= 0.0 ? (right < (double)cells ? (size_t)right + 1 : cells) : 0;
+    *end = *end < *begin ? *begin : *end;
+}
+
+/* Empties a cell. */
+static void begin_cell(const vshi_raster *raster, size_t column, size_t row, vshi_cell *cell) {
+    const size_t side = (size_t)VSHI_CELL * (size_t)raster->supersample;
+    const size_t columns = (size_t)raster->width - column * VSHI_CELL;
+    const size_t rows = (size_t)raster->height - row * VSHI_CELL;
+    cell->column = column;
+    cell->row = row;
+    const uint64_t line = columns >= VSHI_CELL ? 0xff : ((uint64_t)1 << columns) - 1;
+    cell->inside = 0;
+    for (size_t y = 0; y < VSHI_CELL && y < rows; ++y) {
+        cell->inside |= line << (VSHI_CELL * y);
+    }
+    cell->covered = 0;
+    cell->border = 0;
+    memset(cell->owner, 0, side * side * sizeof *cell->owner);
+}
+
+/* First and last sample, within the cell, whose centres lie between two grid coordinates. */
+static void sample_range(int64_t low, int64_t high, int64_t cell_first, int64_t samples, int64_t *first,
+                         int64_t *last) {
+    *first = -floor_divide(HALF_STEP - low, 2 * HALF_STEP) - cell_first;
+    *last = floor_divide(high - HALF_STEP, 2 * HALF_STEP) - cell_first;
+    *first = *first > 0 ? *first : 0;
+    *last = *last < samples - 1 ? *last : samples - 1;
+}
+
+/* Texels of a cell where a triangle finds taken samples. A shared edge is no overlap. */
+typedef struct cell_overlap {
+    uint64_t texels;
+    uint64_t others; /* texels of these with a sample of another object's triangle */
+} cell_overlap;
+
+/* Gives the free samples inside triangle `index` to it (top-left rule, so that one triangle gets a shared
+ * edge). */
+static cell_overlap cover_cell(const vshi_raster *raster, const vshi_uv_triangle *triangles, uint32_t index,
+                               vshi_cell *cell) {
+    const vshi_uv_triangle *triangle = &triangles[index];
+    const int32_t n = raster->supersample;
+    const int64_t side = (int64_t)VSHI_CELL * n;
+    const int64_t left = (int64_t)cell->column * side, top = (int64_t)cell->row * side;
+    const int64_t columns = (int64_t)raster->width * n - left, rows = (int64_t)raster->height * n - top;
+    int64_t x0, x1, y0, y1;
+    sample_range(least(triangle->grid_x), greatest(triangle->grid_x), left, columns < side ? columns : side,
+                 &x0, &x1);
+    sample_range(least(triangle->grid_y), greatest(triangle->grid_y), top, rows < side ? rows : side, &y0,
+                 &y1);
+    cell_overlap taken = {0, 0};
+    if (x0 > x1 || y0 > y1) {
+        return taken;
+    }
+    exact row_value[3], step_x[3], step_y[3], bias[3];
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        const int64_t dx = triangle->grid_x[j] - triangle->grid_x[i];
+        const int64_t dy = triangle->grid_y[j] - triangle->grid_y[i];
+        row_value[i] =
+            edge_at(triangle, i, (2 * (left + x0) + 1) * HALF_STEP, (2 * (top + y0) + 1) * HALF_STEP);
+        step_x[i] = -(exact)dy * (2 * HALF_STEP);
+        step_y[i] = (exact)dx * (2 * HALF_STEP);
+        /* y points down and areas are positive: the inside lies below a top edge and right of a left one. */
+        bias[i] = dy < 0 || (dy == 0 && dx > 0) ? 1 : 0;
+    }
+    for (int64_t y = y0; y <= y1; ++y) {
+        exact value[3] = {row_value[0], row_value[1], row_value[2]};
+        uint32_t *owner = cell->owner + y * side;
+        const int64_t line = y / n * VSHI_CELL;
+        for (int64_t x = x0; x <= x1; ++x) {
+            if (value[0] + bias[0] > 0 && value[1] + bias[1] > 0 && value[2] + bias[2] > 0) {
+                const uint64_t texel = (uint64_t)1 << (line + x / n);
+                if (owner[x] == 0) {
+                    owner[x] = index + 1;
+                    cell->covered |= texel;
+                } else {
+                    taken.texels |= texel;
+                    taken.others |= triangles[owner[x] - 1].object != triangle->object ? texel : 0;
+                }
+            }
+            value[0] += step_x[0];
+            value[1] += step_x[1];
+            value[2] += step_x[2];
+        }
+        row_value[0] += step_y[0];
+        row_value[1] += step_y[1];
+        row_value[2] += step_y[2];
+    }
+    return taken;
+}
+
+/* Whether the triangle's inside meets the inside of a texel: no edge of either separates them. */
+static bool touches(const vshi_raster *raster, const vshi_uv_triangle *triangle, int64_t x, int64_t y) {
+    const int64_t steps = texel_steps(raster);
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        /* The texel's corner that lies farthest to the inner side of the edge. */
+        const int64_t corner_x = (triangle->grid_y[j] < triangle->grid_y[i] ? x + 1 : x) * steps;
+        const int64_t corner_y = (triangle->grid_x[j] > triangle->grid_x[i] ? y + 1 : y) * steps;
+        if (edge_at(triangle, i, corner_x, corner_y) <= 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Finds the point of the triangle's outline nearest to a point outside it; returns the squared distance. */
+static double nearest_point(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
+    double best = INFINITY;
+    for (int i = 0; i < 3; ++i) {
+        const int j = (i + 1) % 3;
+        const double dx = triangle->x[j] - triangle->x[i], dy = triangle->y[j] - triangle->y[i];
+        const double px = x - triangle->x[i], py = y - triangle->y[i];
+        const double length2 = dx * dx + dy * dy;
+        double t = length2 > 0.0 ? (px * dx + py * dy) / length2 : 0.0;
+        t = t < 0.0 ? 0.0 : t > 1.0 ? 1.0 : t;
+        const double qx = px - t * dx, qy = py - t * dy;
+        const double distance = qx * qx + qy * qy;
+        if (distance < best) {
+            best = distance;
+            weight[i] = 1.0 - t;
+            weight[j] = t;
+            weight[(i + 2) % 3] = 0.0;
+        }
+    }
+    return best;
+}
+
+/* Adds texels without covered samples that triangle `index` reaches as border texels. Called in the order of
+ * the triangles after all have covered, so that the first of equally near ones stays. */
+static void touch_cell(const vshi_raster *raster, const vshi_uv_triangle *triangles, uint32_t index,
+                       vshi_cell *cell) {
+    const vshi_uv_triangle *triangle = &triangles[index];
+    const uint64_t open = cell->inside & ~cell->covered;
+    if (open == 0) {
+        return;
+    }
+    const int64_t steps = texel_steps(raster);
+    const int64_t left = (int64_t)cell->column * VSHI_CELL, top = (int64_t)cell->row * VSHI_CELL;
+    int64_t x0 = floor_divide(least(triangle->grid_x), steps) - left;
+    int64_t x1 = floor_divide(greatest(triangle->grid_x) - 1, steps) - left;
+    int64_t y0 = floor_divide(least(triangle->grid_y), steps) - top;
+    int64_t y1 = floor_divide(greatest(triangle->grid_y) - 1, steps) - top;
+    x0 = x0 > 0 ? x0 : 0;
+    y0 = y0 > 0 ? y0 : 0;
+    x1 = x1 < VSHI_CELL - 1 ? x1 : VSHI_CELL - 1;
+    y1 = y1 < VSHI_CELL - 1 ? y1 : VSHI_CELL - 1;
+    for (int64_t y = y0; y <= y1; ++y) {
+        for (int64_t x = x0; x <= x1; ++x) {
+            const int64_t bit = y * VSHI_CELL + x;
+            if (((open >> bit) & 1) == 0 || !touches(raster, triangle, left + x, top + y)) {
+                continue;
+            }
+            double weight[3];
+            const double distance =
+                nearest_point(triangle, (double)(left + x) + 0.5, (double)(top + y) + 0.5, weight);
+            if (((cell->border >> bit) & 1) == 0 || distance < cell->distance[bit]) {
+                cell->border |= (uint64_t)1 << bit;
+                cell->nearest[bit] = index + 1;
+                cell->distance[bit] = distance;
+            }
+        }
+    }
+}
+
+/* Barycentric coordinates of a point of the image, clamped into the triangle. */
+static void find_barycentric(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
+    const double ax = triangle->x[1] - triangle->x[0], ay = triangle->y[1] - triangle->y[0];
+    const double bx = triangle->x[2] - triangle->x[0], by = triangle->y[2] - triangle->y[0];
+    const double px = x - triangle->x[0], py = y - triangle->y[0];
+    const double area = ax * by - ay * bx;
+    const double b = (px * by - py * bx) / area;
+    const double c = (ax * py - ay * px) / area;
+    if (!isfinite(b) || !isfinite(c)) {
+        nearest_point(triangle, x, y, weight);
+        return;
+    }
+    weight[0] = fmax(1.0 - b - c, 0.0);
+    weight[1] = fmax(b, 0.0);
+    weight[2] = fmax(c, 0.0);
+    const double sum = weight[0] + weight[1] + weight[2];
+    for (int k = 0; k < 3; ++k) {
+        weight[k] /= sum;
+    }
+}
+
+/* Clips a convex polygon to sign × (axis coordinate - limit) <= 0 (Sutherland and Hodgman, "Reentrant polygon
+ * clipping", 1974). */
+static int clip(const double (*from)[2], int count, int axis, double sign, double limit, double (*to)[2]) {
+    int kept = 0;
+    for (int i = 0; i < count; ++i) {
+        const double *a = from[i], *b = from[(i + 1) % count];
+        const double over_a = sign * (a[axis] - limit), over_b = sign * (b[axis] - limit);
+        if (over_a <= 0.0) {
+            to[kept][0] = a[0];
+            to[kept++][1] = a[1];
+        }
+        if ((over_a <= 0.0) != (over_b <= 0.0)) {
+            const double t = over_a / (over_a - over_b);
+            to[kept][0] = a[0] + t * (b[0] - a[0]);
+            to[kept++][1] = a[1] + t * (b[1] - a[1]);
+        }
+    }
+    return kept;
+}
+
+/* Centroid of the part of the triangle within half a texel, along both axes, of its point nearest to (x, y),
+ * which is outside it. */
+static void find_centroid_near(const vshi_uv_triangle *triangle, double x, double y, double weight[3]) {
+    enum { MOST = 3 + 4 }; /* corners: each clip adds one at most */
+    double polygon[2][MOST][2], at[2] = {0.0, 0.0};
+    nearest_point(triangle, x, y, weight);
+    for (int k = 0; k < 3; ++k) {
+        at[0] += weight[k] * triangle->x[k];
+        at[1] += weight[k] * triangle->y[k];
+        polygon[0][k][0] = triangle->x[k];
+        polygon[0][k][1] = triangle->y[k];
+    }
+    int count = 3;
+    for (int side = 0; side < 4; ++side) {
+        const int axis = side / 2;
+        const double sign = side % 2 == 0 ? 1.0 : -1.0;
+        count = clip((const double(*)[2])polygon[side % 2], count, axis, sign, at[axis] + sign * 0.5,
+                     polygon[1 - side % 2]);
+    }
+    double area = 0.0, sum[2] = {0.0, 0.0};
+    for (int i = 1; i + 1 < count; ++i) { /* a fan around the first corner */
+        const double *o = polygon[0][0], *a = polygon[0][i], *b = polygon[0][i + 1];
+        const double twice = fabs((a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]));
+        area += twice;
+        for (int axis = 0; axis < 2; ++axis) {
+            sum[axis] += twice * (o[axis] + a[axis] + b[axis]) / 3.0;
+        }
+    }
+    if (area > 0.0) {
+        find_barycentric(triangle, sum[0] / area, sum[1] / area, weight);
+    }
+}
+
+/* --- a tile */
 
 double vshi_tile_bytes(const vshi_charts *charts, int32_t threads) {
     const double all_cores = 64.0; /* for threads == 0 */
@@ -95,7 +444,7 @@ void vshi_tile_close(vshi_tile *tile) {
 }
 
 /* Counts texels that a mesh covers again, each once. */
-static void count_overlap(const vshi_overlaps *overlaps, size_t mesh, const vshi_cell_overlap *taken) {
+static void count_overlap(const vshi_overlaps *overlaps, size_t mesh, const cell_overlap *taken) {
     if (taken->texels != 0) {
         atomic_fetch_add_explicit(&overlaps->texels[mesh], (size_t)__builtin_popcountll(taken->texels),
                                   memory_order_relaxed);
@@ -125,18 +474,17 @@ static void count_owners(const vshi_charts *charts, const vshi_tile *tile, uint6
 static void cover(const vshi_charts *charts, vshi_tile *tile, const uint32_t *slot, size_t count,
                   const vshi_overlaps *overlaps) {
     size_t mesh = 0;
-    vshi_cell_overlap again = {0, 0};
+    cell_overlap again = {0, 0};
     for (size_t i = 0; i < count; ++i) {
         const vshi_uv_triangle *t = &tile->triangle[slot[i]];
-        const vshi_cell_overlap taken =
-            vshi_cell_cover(&charts->raster, tile->triangle, slot[i], &tile->cell);
+        const cell_overlap taken = cover_cell(&charts->raster, tile->triangle, slot[i], &tile->cell);
         if (overlaps == NULL || taken.texels == 0) {
             continue;
         }
         if (t->mesh != mesh) {
             count_overlap(overlaps, mesh, &again);
             mesh = t->mesh;
-            again = (vshi_cell_overlap){0, 0};
+            again = (cell_overlap){0, 0};
         }
         if (mesh == overlaps->watched) {
             count_owners(charts, tile, t->object, taken.others & ~again.others, overlaps);
@@ -158,11 +506,11 @@ bool vshi_tile_rasterize(const vshi_charts *charts, vshi_tile *tile, int32_t x, 
         return false;
     }
     const uint32_t *slot = tile->cell_triangle + tile->cell_start[cell];
-    vshi_cell_begin(&charts->raster, tile->column * VSHI_TILE_CELLS + (size_t)x,
-                    tile->row * VSHI_TILE_CELLS + (size_t)y, &tile->cell);
+    begin_cell(&charts->raster, tile->column * VSHI_TILE_CELLS + (size_t)x,
+               tile->row * VSHI_TILE_CELLS + (size_t)y, &tile->cell);
     cover(charts, tile, slot, count, overlaps);
     for (size_t i = 0; i < count; ++i) {
-        vshi_cell_touch(&charts->raster, tile->triangle, slot[i], &tile->cell);
+        touch_cell(&charts->raster, tile->triangle, slot[i], &tile->cell);
     }
     return true;
 }
@@ -181,6 +529,8 @@ uint32_t vshi_tile_owner(const vshi_charts *charts, const vshi_tile *tile, size_
     }
     return owner;
 }
+
+/* --- samples */
 
 vsh_result vshi_samples_allocate(vshi_samples *samples, size_t room, bool tangents, vsh_error *error) {
     *samples = (vshi_samples){.room = room};
@@ -246,8 +596,7 @@ static void write_texel(vshi_sample_writer *w, size_t x, size_t y) {
     double weight[3];
     if (((cell->border >> bit) & 1) != 0) {
         const uint32_t number = cell->nearest[bit];
-        vshi_uv_centroid_near(&w->tile->triangle[number - 1], (double)column + 0.5, (double)row + 0.5,
-                              weight);
+        find_centroid_near(&w->tile->triangle[number - 1], (double)column + 0.5, (double)row + 0.5, weight);
         write_sample(w, number, texel, weight, true);
         return;
     }
@@ -255,9 +604,8 @@ static void write_texel(vshi_sample_writer *w, size_t x, size_t y) {
         const size_t sx = s % n, sy = s / n;
         const uint32_t number = cell->owner[(y * n + sy) * side + x * n + sx];
         if (number != 0) {
-            vshi_uv_barycentric(&w->tile->triangle[number - 1],
-                                (double)column + ((double)sx + 0.5) / (double)n,
-                                (double)row + ((double)sy + 0.5) / (double)n, weight);
+            find_barycentric(&w->tile->triangle[number - 1], (double)column + ((double)sx + 0.5) / (double)n,
+                             (double)row + ((double)sy + 0.5) / (double)n, weight);
             write_sample(w, number, texel, weight, false);
         }
     }

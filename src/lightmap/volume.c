@@ -688,7 +688,8 @@ static vsh_result begin(volume_bake *bake, const vsh_light *lights, const vsh_ru
 static vsh_result bake_all(volume_bake *bake, const vsh_light *lights, const vsh_run *run, vsh_error *error) {
     vshi_job *job;
     vsh_result result;
-    VSHI_TRY(vshi_begin_stage(run, "volume", (SHADE_UNITS + FILL_UNITS) * bake->block_count, &job, error));
+    VSHI_TRY(
+        vshi_job_open(&job, run, "volume", (SHADE_UNITS + FILL_UNITS) * bake->block_count, "volume", error));
     VSHI_TRY_DONE(begin(bake, lights, run, error));
     VSHI_TRY_DONE(vshi_parallel_for(job, bake->block_count, GRAIN, SHADE_UNITS, shade_blocks, bake, error));
     if (atomic_load(&bake->out_of_memory)) {

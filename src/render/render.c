@@ -16,7 +16,6 @@
 #include "field/level.h"
 #include "light/light.h"
 #include "shade/ao.h"
-#include "shade/layers.h"
 #include "shade/shade.h"
 #include "shade/shadow.h"
 #include "trace/sampler.h"

@@ -11,7 +11,7 @@
 #include "shade/occluders.h"
 #include "shapes/outline.h"
 #include "shapes/spheres.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -467,8 +467,8 @@ static vsh_result trace_casters(const selection *of, const vsh_run *run, vshi_tr
         VSHI_TRY_DONE(vshi_solids_create(t.sdfs, t.places[0], t.sdf_count, &made, error));
     }
     if (t.mesh_count > 0 || (solids == NULL && made != NULL)) {
-        VSHI_TRY_DONE(vshi_triangles_create_beside(t.meshes, t.mesh_count, solids == NULL ? made : NULL, run,
-                                                   triangles, error));
+        VSHI_TRY_DONE(vshi_triangles_create(t.meshes, t.mesh_count, solids == NULL ? made : NULL, run,
+                                            triangles, error));
     }
     if (solids != NULL) {
         *solids = made;

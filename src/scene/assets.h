@@ -41,7 +41,7 @@ vsh_result vshi_scene_layer_casters(const vsh_scene *scene, const vsh_assets *as
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_INPUT: a transform that shears or scales a shape or a level set unevenly;
  * - VSH_ERROR_UNSUPPORTED, VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED: as
- *   vshi_triangles_create_beside(), and for level sets vsh_grid_unite() and vshi_field_create(). */
+ *   vshi_triangles_create(), and for level sets vsh_grid_unite() and vshi_field_create(). */
 vsh_result vshi_scene_triangles(const vsh_scene *scene, const vsh_assets *assets,
                                 const vsh_scene_layer *layer, const vsh_run *run, vshi_triangles **triangles,
                                 vsh_error *error);

@@ -255,7 +255,7 @@ static vsh_result warn_lost(const vsh_caster *caster, const vsh_mesh *meshes, si
     if (!any) {
         goto done;
     }
-    VSHI_TRY_DONE(vshi_triangles_create(meshes, count, run, &triangles, error));
+    VSHI_TRY_DONE(vshi_triangles_create(meshes, count, NULL, run, &triangles, error));
     VSHI_TRY_DONE(vshi_field_find_lost(field, meshes, count, triangles, lost, error));
     for (size_t m = 0; m < count; ++m) {
         char help[64] = "finer ones may hold it";
@@ -427,8 +427,9 @@ static vsh_result make_triangles(occluder_build *m, const vsh_scene_layer *layer
     }
     VSHI_TRY(vshi_scene_triangles(m->scene, m->assets, layer, &m->run, triangles, error));
     /* methods need triangles even if all casters are in layers */
-    return *triangles == NULL && layer == NULL ? vshi_triangles_create(NULL, 0, &m->run, triangles, error)
-                                               : VSH_OK;
+    return *triangles == NULL && layer == NULL
+               ? vshi_triangles_create(NULL, 0, NULL, &m->run, triangles, error)
+               : VSH_OK;
 }
 
 /* Makes the casters that values are compared with, unless memory is short: baking needs none of it. */

@@ -66,7 +66,7 @@ static inline int32_t vshi_ao_tile_sampler(int32_t sampler) {
 typedef struct vshi_ao_task {
     const vsh_field *field;
     const vshi_triangles *triangles; /* of exact methods; else may be NULL */
-    struct vshi_layers *layers;      /* beside the field; NULL: none */
+    vshi_layers *layers;             /* beside the field; NULL: none */
     vsh_shade_options options;       /* settled */
     vshi_sampler *sampler;           /* of methods by rays; else NULL */
     vshi_ao_cones *cones;            /* of the method of cones; else NULL */
@@ -118,11 +118,15 @@ void vshi_ao_shoot(const vshi_ao_task *prepared, const vsh_points *points, const
 /* Shades by the options' method, and by the layers: a vshi_shade_fn of a vshi_ao_task. */
 vshi_shade_fn vshi_ao_shade;
 
-/* Single methods, for at most VSHI_AO_GRAIN points. */
-vshi_shade_fn vshi_ao_by_cones;
+/* The methods of rays, for at most VSHI_AO_GRAIN points. */
 vshi_shade_fn vshi_ao_by_rays;
 
 enum { VSHI_AO_GRAIN = 64 }; /* points of a piece, with cones and rays */
+
+/* Combines the layers with the values of points begin … end - 1 in the task's arrays, at most VSHI_AO_GRAIN
+ * points. */
+void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
+                    vsh_shade_stats *stats);
 
 static inline bool vshi_ao_has_rays(const vsh_shade_options *options) {
     return (vsh_method_traits(VSH_NAMES_AO, options->ao_method) & VSH_METHOD_RAYS) != 0;

@@ -5,7 +5,7 @@
  * as 16 marched or 50 traced rays. They decide a fifth of the rays: near the receiver nothing is proved. At
  * an error of 0.01 on the cloister they saved a fifth of the rays and no time. */
 #include "shade/ao.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <string.h>

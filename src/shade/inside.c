@@ -4,7 +4,7 @@
  * faces, so a clear majority decides, and a point seen by many rays from outside is outside. */
 #include "base/vec.h"
 #include "shade/shade.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <string.h>

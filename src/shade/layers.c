@@ -1,4 +1,6 @@
-#include "shade/layers.h"
+/* Layers beside the field: prepared for a light or for AO, then combined with the field's values. */
+#include "shade/ao.h"
+#include "shade/shadow.h"
 
 #include "base/memory.h"
 #include "light/light.h"

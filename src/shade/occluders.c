@@ -7,8 +7,7 @@
 #include "base/memory.h"
 #include "field/field.h"
 #include "geometry/mesh_set.h"
-#include "shade/layers.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -154,18 +153,14 @@ static vsh_result make(const vshi_occluder_parts *parts, vshi_occluders_own *own
 
 vsh_result vshi_occluders_make(const vshi_occluder_parts *parts, vshi_occluders_own *own,
                                vsh_occluders **occluders, vsh_error *error) {
+    vshi_occluders_own none = {.field = NULL};
+    own = own != NULL ? own : &none;
+    *occluders = NULL;
     const vsh_result result = make(parts, own, occluders, error);
     if (result != VSH_OK) {
         vshi_occluders_own_free(own);
     }
     return result;
-}
-
-vsh_result vshi_occluders_from_parts(const vshi_occluder_parts *parts, vsh_occluders **occluders,
-                                     vsh_error *error) {
-    vshi_occluders_own own = {.field = NULL};
-    *occluders = NULL;
-    return vshi_occluders_make(parts, &own, occluders, error);
 }
 
 /* --- from a level set, or from arrays of meshes */
@@ -192,8 +187,7 @@ vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_occluders_opt
     vshi_occluders_own own = {.field = NULL};
     const vshi_field_options of_field = {.reach = full.reach, .grown = full.grown};
     VSHI_TRY(make_field(grid, &of_field, run, &own, error));
-    vshi_occluder_parts parts = {.field = NULL};
-    parts.field = own.field;
+    const vshi_occluder_parts parts = {.field = own.field};
     return vshi_occluders_make(&parts, &own, occluders, error);
 }
 
@@ -253,16 +247,15 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
     }
     if (traced) {
         const double start = vshi_seconds();
-        VSHI_TRY_DONE(vshi_triangles_create(set.meshes, mesh_count, run, &own.triangles, error));
+        VSHI_TRY_DONE(vshi_triangles_create(set.meshes, mesh_count, NULL, run, &own.triangles, error));
         own.triangles_s = vshi_seconds() - start;
     }
     if (own.field == NULL) {
         VSHI_TRY_DONE(vshi_occluders_unknown(own.triangles, 0.0, &own.field, error));
         vshi_mesh_set_note(&set, 0.0, 0.0, &resolved);
     }
-    vshi_occluder_parts parts = {.field = NULL};
-    parts.field = own.field;
-    parts.triangles = parts.true_triangles = own.triangles;
+    const vshi_occluder_parts parts = {
+        .field = own.field, .triangles = own.triangles, .true_triangles = own.triangles};
     vshi_mesh_set_free(&set);
     return vshi_occluders_make(&parts, &own, occluders, error);
 done:

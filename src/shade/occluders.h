@@ -31,6 +31,15 @@ static inline vshi_layer vshi_layer_default(void) {
     return (vshi_layer){.method = -1, .softness = 1.0, .start_offset = -1.0, .ao = 1};
 }
 
+/* Checks layers[index]. Errors: VSH_ERROR_ARGUMENT, naming the layer's number, the member, its value and the
+ * limit. */
+vsh_result vshi_layer_check(const vshi_layer *layers, size_t index, vsh_error *error);
+
+/* Whether a layer's shadows need no field: heights are marched, spheres have closed forms. */
+static inline bool vshi_layer_is_closed(const vshi_layer *layer) {
+    return layer->heights != NULL || layer->spheres != NULL;
+}
+
 /* What a handle is made of. Views: nothing is owned. */
 typedef struct vshi_occluder_parts {
     const vsh_field *field; /* casters in no layer; NULL: they are known by their triangles alone, or all
@@ -46,12 +55,6 @@ typedef struct vshi_occluder_parts {
                           the triangles' longest side, else the voxels of the finest layer, else 1e-5 of the
                           first layer's longest side */
 } vshi_occluder_parts;
-
-/* Makes occluders of parts. The layers are copied; what they and the parts refer to must outlive the handle.
- * Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more layers than
- * VSHI_MAX_LAYERS; as vshi_layer_check()), VSH_ERROR_MEMORY. */
-vsh_result vshi_occluders_from_parts(const vshi_occluder_parts *parts, vsh_occluders **occluders,
-                                     vsh_error *error);
 
 /* The parts that a handle owns and frees. Other members are NULL. */
 typedef struct vshi_occluders_own {
@@ -90,8 +93,10 @@ enum { VSHI_TRACED_RESOLUTION = 96 };
 vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_size, vsh_field **field,
                                   vsh_error *error);
 
-/* As vshi_occluders_from_parts(). It takes over the contents of `own`, which are freed also after an error.
- */
+/* Makes occluders of parts. The layers are copied; what they and the parts refer to must outlive the handle,
+ * unless it is in `own` (NULL: nothing). The handle takes over the contents of `own`, which are freed also
+ * after an error. Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more
+ * layers than VSHI_MAX_LAYERS; as vshi_layer_check()), VSH_ERROR_MEMORY. */
 vsh_result vshi_occluders_make(const vshi_occluder_parts *parts, vshi_occluders_own *own,
                                vsh_occluders **occluders, vsh_error *error);
 void vshi_occluders_own_free(vshi_occluders_own *own);

@@ -6,7 +6,6 @@
 #include "base/memory.h"
 #include "base/parallel.h"
 #include "field/field.h"
-#include "shade/layers.h"
 #include "shade/query.h"
 
 #include <stdlib.h>
@@ -415,7 +414,7 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
         return VSH_OK;
     }
     vshi_job *job;
-    VSHI_TRY(vshi_begin_stage(&full_run, "query", view.count, &job, error));
+    VSHI_TRY(vshi_job_open(&job, &full_run, "query", view.count, "query", error));
     const vsh_result result = shade_many(&call, &full_run, job, stats, error);
     vshi_job_end(job);
     return result;

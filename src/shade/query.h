@@ -2,7 +2,6 @@
 #pragma once
 
 #include "shade/ao.h"
-#include "shade/layers.h"
 #include "shade/shadow.h"
 
 #include <stdbool.h>

@@ -37,10 +37,6 @@ static inline vshi_vec vshi_direction_to_field(const vsh_field *field, vshi_vec 
 /* The group that holds an element. Groups follow each other: first[count + 1] are their first elements. */
 size_t vshi_find_group(const size_t *first, size_t count, size_t element);
 
-/* Begins a job of `total` units. Errors: VSH_ERROR_MEMORY. */
-vsh_result vshi_begin_stage(const vsh_run *run, const char *stage, size_t total, vshi_job **job,
-                            vsh_error *error);
-
 /* Runs fn for each of `count` elements, one at a time, as a job of its own. Errors: those of fn,
  * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED, VSH_ERROR_INTERNAL. */
 vsh_result vshi_run_stage(const vsh_run *run, const char *stage, size_t count, vshi_element_fn *fn,
@@ -158,6 +154,19 @@ bool vshi_light_is_cut(const vshi_lifter *lifter, const vshi_lift_point *point);
 /* Finds the lift of a point for the light: point->lift times a share from 0 to 1. */
 vshi_vec vshi_lift_find(const vshi_lifter *lifter, const vshi_lift_point *point);
 
+/* --- layers beside the field: prepared for a light or for AO, then combined with the field's values
+ * (layers.c) */
+
+/* The layers that take part in one light's shadow, or in AO. */
+typedef struct vshi_layers vshi_layers;
+
+/* Prepares the layers that cast for `light`, or for AO (NULL), by resolved options. `sphere` is
+ * vshi_ao_prepare()'s. *layers is NULL if there are none. Free with vshi_layers_free(). Errors:
+ * VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+vsh_result vshi_layers_prepare(const vsh_occluders *occluders, const vsh_shade_options *options,
+                               const vsh_light *light, bool sphere, vshi_layers **layers, vsh_error *error);
+void vshi_layers_free(vshi_layers *layers); /* NULL does nothing */
+
 /* --- points in solids or behind walls, by rays against the triangles that bound them (inside.c) */
 
 enum { VSHI_OUTSIDE = 0, VSHI_INSIDE = 1 };
@@ -176,7 +185,7 @@ typedef struct vshi_open_field {
 void vshi_inside(const vshi_triangles *triangles, size_t count, const double *positions, const float *normals,
                  const bool *follows, const vshi_open_field *open, uint8_t *where);
 
-/* --- chunks of cones: set up in double precision, marched, read back (rays.c) */
+/* --- chunks of cones: set up in double precision, marched, read back */
 
 /* A cone in field space. */
 typedef struct vshi_cone {

@@ -3,8 +3,7 @@
 #include "base/bytes.h"
 #include "base/elementary.h"
 #include "base/floats.h"
-#include "shade/layers.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <stdio.h>

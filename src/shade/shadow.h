@@ -9,7 +9,7 @@
 typedef struct vshi_shadow_task {
     const vsh_field *field;
     const vshi_triangles *triangles; /* of exact methods; else may be NULL */
-    struct vshi_layers *layers;      /* beside the field; NULL: none */
+    vshi_layers *layers;             /* beside the field; NULL: none */
     const vsh_light *light;
     vsh_shade_options options; /* settled */
     vshi_sampler *sampler;     /* of methods by rays; else NULL */
@@ -101,6 +101,11 @@ static inline void vshi_shadow_settle(const vshi_shadow_task *task, size_t point
 
 /* Shades by rays, adaptive and exact. */
 void vshi_shadow_by_rays(const vshi_shadow_task *task, size_t begin, size_t end, vsh_shade_stats *stats);
+
+/* Combines the layers with the values of points begin … end - 1 in the task's arrays, at most VSHI_PIECE
+ * points. */
+void vshi_layers_shadow(const vshi_layers *layers, const vshi_shadow_task *task, size_t begin, size_t end,
+                        vsh_shade_stats *stats);
 
 /* --- proofs that neighbouring points share (blocks.c) */
 

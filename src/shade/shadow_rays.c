@@ -1,7 +1,7 @@
 /* Shadow values from rays over the light's disc: a fixed number (rays), or as many as a cone leaves open
  * (adaptive, on the field; exact, on the triangles). */
 #include "shade/shadow.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <math.h>
 #include <string.h>

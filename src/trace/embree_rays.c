@@ -10,6 +10,26 @@ static const double OFFSET = 0x1p-18;
 
 static const double COHERENT = 0.9; /* least cosine between a packet's rays */
 
+/* Rays traced at a time if the machine has vectors so wide; else twice half as many. On the cloister, towards
+ * a sun of 5°, a ray takes 36 ns alone, 15 in packets of eight and 9.5 in packets of sixteen; on lobes of
+ * 50,000 triangles 55, 38 and 28. */
+enum { PACKET = 16 };
+
+/* A ray that begins farther than this from the scene's centre is moved up to the scene, whose half size is at
+ * most 1. */
+#define FAR_ORIGIN 4.0
+
+/* How Embree traces a packet: its rays together, or one by one if they diverge. */
+static inline enum RTCIntersectContextFlags find_flags(const vshi_triangles *triangles, bool together) {
+    return !triangles->fine && together ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
+                                        : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+}
+
+/* VSHI_SOLID_… of a primitive of a geometry. */
+static inline uint8_t find_solid(const vshi_triangles *triangles, unsigned mesh, unsigned local) {
+    return triangles->solid[triangles->first[mesh] + local];
+}
+
 /* Whether rays have similar directions. */
 static bool go_together(const vshi_segment_ray *rays, int count) {
     for (int i = 1; i < count; ++i) {
@@ -32,16 +52,16 @@ static bool approach(double origin[3], const double direction[3], double *far) {
             distance += origin[axis] * origin[axis];
             along -= origin[axis] * direction[axis];
         }
-        if (distance <= VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN) {
+        if (distance <= FAR_ORIGIN * FAR_ORIGIN) {
             return true;
         }
-        const double skip = along - VSHI_FAR_ORIGIN;
+        const double skip = along - FAR_ORIGIN;
         if (!(skip < *far)) { /* not finite either */
             return false;
         }
         if (!(skip > (move == 0 ? 0.0 : MOVED))) {
             /* the scene is in the ball of √3 around 0 */
-            return distance <= 2.0 * VSHI_FAR_ORIGIN * VSHI_FAR_ORIGIN;
+            return distance <= 2.0 * FAR_ORIGIN * FAR_ORIGIN;
         }
         for (int axis = 0; axis < 3; ++axis) {
             origin[axis] += skip * direction[axis];
@@ -72,7 +92,7 @@ static bool aim(const vshi_triangles *triangles, const vshi_segment_ray *ray, st
     return true;
 }
 
-/* Copies half of a packet, row by row of VSHI_PACKET values. */
+/* Copies half of a packet, row by row of PACKET values. */
 static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *part) {
     const float *from = whole->org_x;
     float *to = part->org_x;
@@ -81,8 +101,9 @@ static void copy_half(int half, const struct RTCRay16 *whole, struct RTCRay8 *pa
     }
 }
 
-void vshi_triangles_occlude(const vshi_triangles *triangles, const int *valid,
-                            struct RTCIntersectContext *context, struct RTCRay16 *packet) {
+/* Traces a packet: sets tfar of each valid ray that meets something to -∞. */
+static void occlude(const vshi_triangles *triangles, const int *valid, struct RTCIntersectContext *context,
+                    struct RTCRay16 *packet) {
     if (triangles->wide) {
         triangles->embree->rtcOccluded16(valid, triangles->scene, context, packet);
         return;
@@ -119,15 +140,15 @@ static query begin_query(const vshi_triangles *triangles, RTCFilterFunctionN fil
 static void find_blocked(const vshi_triangles *triangles, const vshi_segment_ray *rays, size_t count,
                          RTCFilterFunctionN filter, bool *blocked) {
     query q = begin_query(triangles, filter);
-    for (size_t begin = 0; begin < count; begin += VSHI_PACKET) {
+    for (size_t begin = 0; begin < count; begin += PACKET) {
         struct RTCRay16 packet = {0};
-        _Alignas(64) int valid[VSHI_PACKET] = {0};
-        const int lanes = count - begin < VSHI_PACKET ? (int)(count - begin) : VSHI_PACKET;
+        _Alignas(64) int valid[PACKET] = {0};
+        const int lanes = count - begin < PACKET ? (int)(count - begin) : PACKET;
         for (int lane = 0; lane < lanes; ++lane) {
             valid[lane] = aim(triangles, &rays[begin + (size_t)lane], &packet, lane) ? -1 : 0;
         }
-        q.context.flags = vshi_triangles_flags(triangles, go_together(rays + begin, lanes));
-        vshi_triangles_occlude(triangles, valid, &q.context, &packet);
+        q.context.flags = find_flags(triangles, go_together(rays + begin, lanes));
+        occlude(triangles, valid, &q.context, &packet);
         for (int lane = 0; lane < lanes; ++lane) {
             blocked[begin + (size_t)lane] = valid[lane] != 0 && packet.tfar[lane] < 0.0f;
         }
@@ -155,8 +176,7 @@ static void pass_fronts(const struct RTCFilterFunctionNArguments *args) {
             along += ray[(VSHI_RAY_DIRECTION + axis) * n + i] * hit[(VSHI_HIT_NORMAL + axis) * n + i];
         }
         const uint8_t solid =
-            vshi_triangles_solid(triangles, of[VSHI_HIT_MESH * n + i], of[VSHI_HIT_TRIANGLE * n + i]) &
-            VSHI_SOLID_SIDE;
+            find_solid(triangles, of[VSHI_HIT_MESH * n + i], of[VSHI_HIT_TRIANGLE * n + i]) & VSHI_SOLID_SIDE;
         if (!(solid == VSHI_SOLID_BEFORE ? along < 0.0f : along > 0.0f)) {
             args->valid[i] = 0;
         }
@@ -194,7 +214,7 @@ static void pass_sheets(const struct RTCFilterFunctionNArguments *args) {
             continue;
         }
         const uint8_t solid =
-            vshi_triangles_solid(q->triangles, hit[VSHI_HIT_MESH * n + i], hit[VSHI_HIT_TRIANGLE * n + i]);
+            find_solid(q->triangles, hit[VSHI_HIT_MESH * n + i], hit[VSHI_HIT_TRIANGLE * n + i]);
         const int8_t out = crosses(solid, vshi_packet_vector(args->hit, VSHI_HIT_NORMAL, n, i),
                                    vshi_packet_vector(ray, VSHI_RAY_DIRECTION, n, i));
         const bool vessel = (solid & VSHI_SOLID_VESSEL) != 0;
@@ -214,7 +234,7 @@ static uint8_t find_met(const vshi_triangles *triangles, const struct RTCRayHit 
     if (hit->geomID == RTC_INVALID_GEOMETRY_ID) {
         return VSHI_MEETS_NOTHING;
     }
-    const uint8_t solid = vshi_triangles_solid(triangles, hit->geomID, hit->primID);
+    const uint8_t solid = find_solid(triangles, hit->geomID, hit->primID);
     const vshi_vec normal = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
     const vshi_vec direction = {(double)ray->ray.dir_x, (double)ray->ray.dir_y, (double)ray->ray.dir_z};
     const bool out = crosses(solid, normal, direction) > 0;
@@ -316,4 +336,184 @@ void vshi_triangles_bounds(const vshi_triangles *triangles, double low[3], doubl
 
 double vshi_triangles_offset(const vshi_triangles *triangles) {
     return OFFSET * triangles->size;
+}
+
+/* --- packets of rays of neighbouring points, each over its own disc or dome
+ *
+ * All discs use the points of one net; each texel shifts their digits (sampler.h). A block of 2^k points has
+ * one point in each of 2^k cells of the square; a shift permutes the cells. So each texel has one ray in any
+ * cell, and the rays of one cell, which have similar directions, make a packet. On lobes of 50,000 triangles,
+ * under a sun of 30°, a ray takes 24 ns; with packets in the order of the index it takes 52 ns. */
+
+static const float QUARTER = 0.78539816339744831f; /* π / 4 */
+
+/* A packet's discs: the data that all of their rays share. */
+typedef struct group {
+    struct RTCRay16 ray;
+    float axis[3][PACKET], u[3][PACKET], v[3][PACKET], normal[3][PACKET], far[PACKET];
+    float rise[PACKET], lean[2][PACKET]; /* of domes: vshi_lean */
+    bool leans;                          /* any dome does */
+    uint32_t shift[2][PACKET];
+    float lowest[PACKET]; /* least component along the normal: 0, or -∞ without a horizon */
+    int valid[PACKET];    /* -1: the lane has a disc */
+    int used;             /* discs */
+} group;
+
+static void set_lane(const vshi_triangles *t, const vshi_disc *disc, int lane, group *g) {
+    float *const from[3] = {g->ray.org_x, g->ray.org_y, g->ray.org_z};
+    const double axis[3] = {disc->axis.x, disc->axis.y, disc->axis.z};
+    const double u[3] = {disc->u.x, disc->u.y, disc->u.z}, v[3] = {disc->v.x, disc->v.y, disc->v.z};
+    const double normal[3] = {disc->normal.x, disc->normal.y, disc->normal.z};
+    for (size_t k = 0; k < 3; ++k) {
+        from[k][lane] = (float)((disc->origin[k] - t->centre[k]) * t->scale);
+        g->axis[k][lane] = (float)axis[k];
+        g->u[k][lane] = (float)u[k];
+        g->v[k][lane] = (float)v[k];
+        g->normal[k][lane] = (float)normal[k];
+    }
+    const double far = disc->far * t->scale;
+    g->far[lane] = far < (double)FLT_MAX ? (float)far : INFINITY;
+    g->lowest[lane] = normal[0] != 0.0 || normal[1] != 0.0 || normal[2] != 0.0 ? 0.0f : -INFINITY;
+    g->leans = g->leans || disc->lean.rise < 1.0;
+    g->rise[lane] = (float)disc->lean.rise;
+    g->lean[0][lane] = (float)disc->lean.x;
+    g->lean[1][lane] = (float)disc->lean.y;
+    g->shift[0][lane] = disc->shift[0];
+    g->shift[1][lane] = disc->shift[1];
+    g->ray.mask[lane] = 0xffffffffu;
+}
+
+/* Maps digits to the unit disc (Shirley and Chiu, "A low distortion map between disk and square", 1997). The
+ * series for angles are exact to 4e-7. */
+static inline void to_disc(uint32_t digits[2][PACKET], float x[PACKET], float y[PACKET]) {
+    for (int l = 0; l < PACKET; ++l) {
+        const float a = (float)(int32_t)(digits[0][l] ^ 0x80000000u) * 0x1p-31f;
+        const float b = (float)(int32_t)(digits[1][l] ^ 0x80000000u) * 0x1p-31f;
+        const bool wide = fabsf(a) > fabsf(b);
+        const float radius = wide ? a : b, across = wide ? b : a;
+        const float angle = QUARTER * (across / (radius != 0.0f ? radius : 1.0f)), q = angle * angle;
+        const float sine = angle * (1.0f + q * (-1.0f / 6.0f + q * (1.0f / 120.0f - q * (1.0f / 5040.0f))));
+        const float cosine =
+            1.0f + q * (-0.5f + q * (1.0f / 24.0f + q * (-1.0f / 720.0f + q * (1.0f / 40320.0f))));
+        x[l] = radius * (wide ? cosine : sine);
+        y[l] = radius * (wide ? sine : cosine);
+    }
+}
+
+/* Aims the lanes at places of their discs. A ray below its disc's horizon is not valid. */
+static inline void aim_at_discs(group *g, const float x[PACKET], const float y[PACKET], int valid[PACKET]) {
+    struct RTCRay16 *r = &g->ray;
+    for (int l = 0; l < PACKET; ++l) {
+        const float dx = g->axis[0][l] + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
+        const float dy = g->axis[1][l] + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
+        const float dz = g->axis[2][l] + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
+        const float unit = 1.0f / sqrtf(dx * dx + dy * dy + dz * dz);
+        r->dir_x[l] = dx * unit;
+        r->dir_y[l] = dy * unit;
+        r->dir_z[l] = dz * unit;
+        const float up = dx * g->normal[0][l] + dy * g->normal[1][l] + dz * g->normal[2][l];
+        valid[l] = up > g->lowest[l] ? g->valid[l] : 0;
+    }
+}
+
+/* vshi_dome_place() */
+static inline void place_on_domes(const group *g, float x[PACKET], float y[PACKET]) {
+    for (int l = 0; l < PACKET; ++l) {
+        const float along = x[l] * g->lean[0][l] + y[l] * g->lean[1][l];
+        const float edge = 1.0f - (x[l] * x[l] + y[l] * y[l]) + along * along;
+        const float to = (1.0f + g->rise[l]) * along + (1.0f - g->rise[l]) * sqrtf(edge > 0.0f ? edge : 0.0f);
+        const float by = 0.5f * to - along;
+        x[l] += by * g->lean[0][l];
+        y[l] += by * g->lean[1][l];
+    }
+}
+
+/* The same on domes. */
+static inline void aim_at_domes(group *g, float x[PACKET], float y[PACKET], int valid[PACKET]) {
+    struct RTCRay16 *r = &g->ray;
+    if (g->leans) {
+        place_on_domes(g, x, y);
+    }
+    for (int l = 0; l < PACKET; ++l) {
+        const float square = 1.0f - (x[l] * x[l] + y[l] * y[l]);
+        const float z = sqrtf(square > 0.0f ? square : 0.0f);
+        r->dir_x[l] = g->axis[0][l] * z + (g->u[0][l] * x[l] + g->v[0][l] * y[l]);
+        r->dir_y[l] = g->axis[1][l] * z + (g->u[1][l] * x[l] + g->v[1][l] * y[l]);
+        r->dir_z[l] = g->axis[2][l] * z + (g->u[2][l] * x[l] + g->v[2][l] * y[l]);
+        valid[l] = g->valid[l];
+    }
+}
+
+/* Traces a block of `size` points of the net for a group, in the order of the cells. The first 2^each lanes
+ * have a disc each; the next 2^each have the same discs in the next cell, and so on. */
+static void trace_block(const vshi_triangles *t, const uint32_t (*points)[2], bool domes, group *g, int each,
+                        uint32_t size, int32_t *lit) {
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    context.flags = find_flags(t, true);
+    uint32_t cell[PACKET];
+    int32_t seen[PACKET] = {0};
+    for (int l = 0; l < PACKET; ++l) {
+        const uint32_t beyond = (uint32_t)l >> each;
+        g->valid[l] = (l & ((1 << each) - 1)) < g->used && beyond < size ? -1 : 0;
+        cell[l] = (beyond < size ? beyond : 0) ^ vshi_sampler_cell(size, g->shift[0][l], g->shift[1][l]);
+    }
+    for (uint32_t c = 0; c < size; c += (uint32_t)PACKET >> each) {
+        uint32_t digits[2][PACKET];
+        float x[PACKET], y[PACKET];
+        _Alignas(64) int valid[PACKET];
+        for (int l = 0; l < PACKET; ++l) {
+            const uint32_t *point = points[c ^ cell[l]];
+            digits[0][l] = point[0] ^ g->shift[0][l];
+            digits[1][l] = point[1] ^ g->shift[1][l];
+        }
+        to_disc(digits, x, y);
+        if (domes) {
+            aim_at_domes(g, x, y, valid);
+        } else {
+            aim_at_discs(g, x, y, valid);
+        }
+        memcpy(g->ray.tfar, g->far, sizeof g->far);
+        occlude(t, valid, &context, &g->ray);
+        for (int l = 0; l < PACKET; ++l) {
+            seen[l] += valid[l] & (g->ray.tfar[l] >= 0.0f); /* -∞ if the ray meets something */
+        }
+    }
+    for (int l = 0; l < PACKET; ++l) {
+        if (g->valid[l] != 0) {
+            lit[l & ((1 << each) - 1)] += seen[l];
+        }
+    }
+}
+
+bool vshi_triangles_sees(const vshi_triangles *triangles, const double origin[3]) {
+    double distance = 0.0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const double at = (origin[axis] - triangles->centre[axis]) * triangles->scale;
+        distance += at * at;
+    }
+    return distance <= FAR_ORIGIN * FAR_ORIGIN;
+}
+
+void vshi_triangles_discs(const vshi_triangles *triangles, const vshi_sampler *sampler, bool domes,
+                          const vshi_disc *discs, size_t count, int32_t first, int32_t last, int32_t *lit) {
+    for (size_t begin = 0; begin < count; begin += PACKET) {
+        group g = {.used = count - begin < PACKET ? (int)(count - begin) : PACKET};
+        int each = 0;
+        while (1 << each < g.used) {
+            ++each;
+        }
+        for (int l = 0; l < PACKET; ++l) {
+            const int k = l & ((1 << each) - 1);
+            set_lane(triangles, &discs[begin + (size_t)(k < g.used ? k : 0)], l, &g);
+        }
+        /* blocks of the net: the first has VSHI_SAMPLER_BLOCK points, each further one as many as all before
+         */
+        for (int32_t at = first; at < last;) {
+            const int32_t size = at == 0 ? VSHI_SAMPLER_BLOCK : at;
+            trace_block(triangles, vshi_sampler_cells(sampler, (uint32_t)at), domes, &g, each, (uint32_t)size,
+                        lit + begin);
+            at += size;
+        }
+    }
 }

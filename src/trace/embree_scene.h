@@ -1,8 +1,8 @@
-/* The Embree scene behind vshi_triangles, for the files that build and trace it. */
+/* The Embree scene behind vshi_triangles, which embree.c builds and embree_rays.c traces. */
 #pragma once
 
 #include "geometry/alpha_mask.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #include <stdint.h>
 
@@ -81,7 +81,7 @@ struct vshi_triangles {
     uint8_t *solid;                          /* [count]: VSHI_SOLID_… */
     size_t *cells;                           /* of the meshes: of terrains, which are quads; else 0 */
     bool has_solids, has_holes, has_vessels; /* any triangle has such */
-    bool wide;                               /* VSHI_PACKET rays are traced at once, not in two halves */
+    bool wide;                               /* 16 rays are traced at once, not in two halves */
     double low[3], high[3]; /* the triangles' box, world space; low > high if there are none */
     bool fine; /* quads smaller than the gaps between a packet's rays: a quarter faster one by one */
     double centre[3];
@@ -97,11 +97,6 @@ struct vshi_triangles {
     atomic_bool refused;
 };
 
-/* VSHI_SOLID_… of a primitive of a geometry. */
-static inline uint8_t vshi_triangles_solid(const vshi_triangles *triangles, unsigned mesh, unsigned local) {
-    return triangles->solid[triangles->first[mesh] + local];
-}
-
 /* Rows of N values of a packet's rays and hits; Embree names them in C++ only. Hits follow their rays. */
 enum { VSHI_RAY_ORIGIN = 0, VSHI_RAY_NEAR = 3, VSHI_RAY_DIRECTION = 4, VSHI_RAY_FAR = 8, VSHI_RAY_ROWS = 12 };
 enum { VSHI_HIT_NORMAL = 0, VSHI_HIT_U = 3, VSHI_HIT_V = 4, VSHI_HIT_TRIANGLE = 5, VSHI_HIT_MESH = 6 };
@@ -111,38 +106,3 @@ static inline vshi_vec vshi_packet_vector(const void *packet, size_t row, size_t
     const float *at = (const float *)packet + row * lanes + lane;
     return (vshi_vec){(double)at[0], (double)at[lanes], (double)at[2 * lanes]};
 }
-
-/* How Embree traces a packet: its rays together, or one by one if they diverge. */
-static inline enum RTCIntersectContextFlags vshi_triangles_flags(const vshi_triangles *triangles,
-                                                                 bool together) {
-    return !triangles->fine && together ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT
-                                        : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-}
-
-/* Rays traced at a time if the machine has vectors so wide; else twice half as many. On the cloister, towards
- * a sun of 5°, a ray takes 36 ns alone, 15 in packets of eight and 9.5 in packets of sixteen; on lobes of
- * 50,000 triangles 55, 38 and 28. */
-enum { VSHI_PACKET = 16 };
-
-/* A ray that begins farther than this from the scene's centre is moved up to the scene, whose half size is at
- * most 1. */
-#define VSHI_FAR_ORIGIN 4.0
-
-/* Traces a packet: sets tfar of each valid ray that meets something to -∞. */
-void vshi_triangles_occlude(const vshi_triangles *triangles, const int *valid,
-                            struct RTCIntersectContext *context, struct RTCRay16 *packet);
-
-/* --- geometries with code of ours (embree_geometries.c) */
-
-/* Adds triangles->solids as geometry `number`; false if Embree fails, which keeps the reason. */
-bool vshi_triangles_attach_solids(vshi_triangles *triangles, unsigned number);
-
-/* Makes sieves of the meshes; triangles->sieves stays NULL if none is needed. `held` bytes are in use.
- * Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
-vsh_result vshi_sieves_create(vshi_triangles *triangles, const vsh_mesh *meshes, size_t count,
-                              const vsh_run *run, double held, vsh_error *error);
-void vshi_sieves_free(vshi_triangles *triangles);
-
-/* Lets rays pass through a mesh's geometry as its sieve allows. Vertices and corners are Embree's buffers. */
-void vshi_sieve_attach(const vshi_triangles *triangles, size_t mesh, RTCGeometry geometry,
-                       const float *vertices, const uint32_t *corners);

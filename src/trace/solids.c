@@ -1,7 +1,7 @@
 /* Sphere tracing of procedural solids (J. C. Hart, "Sphere tracing: a geometric method for the antialiased
  * ray tracing of implicit surfaces", 1996). A tree's distance is at most the true one and changes by at most
  * 1 per unit (geometry/sdf.c). So a step of that length meets nothing. */
-#include "trace/solids.h"
+#include "trace/trace.h"
 
 #include "base/elementary.h"
 #include "base/floats.h"

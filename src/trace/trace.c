@@ -2,8 +2,6 @@
 #include "trace/trace.h"
 #include "base/vec.h"
 #include "light/light.h"
-#include "trace/embree.h"
-#include "trace/solids.h"
 
 #include <string.h>
 

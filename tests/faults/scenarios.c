@@ -184,7 +184,7 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
     layers[2].field = parts.field;
     parts.layers = layers;
     parts.layer_count = 3;
-    MAKE(layered, vshi_occluders_from_parts(&parts, &layered, error));
+    MAKE(layered, vshi_occluders_make(&parts, NULL, &layered, error));
     vsh_shade_options options = preview_options();
     const vsh_light light = vsh_light_default();
     MAKE(query, vsh_query_create(layered, &light, 1, &options, &query, error));
@@ -211,7 +211,7 @@ static vsh_result make_casters(const vsh_run *run, vsh_error *error) {
     const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
     MAKE(solids, vshi_solids_create(&sdf, NULL, 1, &solids, error));
-    MAKE(triangles, vshi_triangles_create(&mesh, 1, run, &triangles, error));
+    MAKE(triangles, vshi_triangles_create(&mesh, 1, NULL, run, &triangles, error));
     return VSH_OK;
 }
 

@@ -113,7 +113,7 @@ vsh_occluders *fuzz_take_occluders(fuzz_input *input) {
         parts.layer_count = 1;
     }
     vsh_occluders *occluders;
-    FUZZ_MAKE(occluders, vshi_occluders_from_parts(&parts, &occluders, fuzz_error()));
+    FUZZ_MAKE(occluders, vshi_occluders_make(&parts, NULL, &occluders, fuzz_error()));
     return occluders != NULL ? occluders : made.occluders;
 }
 

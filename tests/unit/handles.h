@@ -85,7 +85,7 @@ static inline float distance_at(const vsh_field *field, const double position[3]
 
 static inline vshi_triangles *triangles_from(const vsh_mesh *meshes, size_t count) {
     vshi_triangles *triangles = NULL;
-    assert_ok(vshi_triangles_create(meshes, count, NULL, &triangles, &failure));
+    assert_ok(vshi_triangles_create(meshes, count, NULL, NULL, &triangles, &failure));
     return triangles;
 }
 
@@ -93,7 +93,7 @@ static inline vsh_occluders *occluders_from_triangles(const vshi_triangles *tria
     vshi_occluder_parts parts = {.field = NULL};
     vsh_occluders *occluders = NULL;
     parts.triangles = triangles;
-    assert_ok(vshi_occluders_from_parts(&parts, &occluders, &failure));
+    assert_ok(vshi_occluders_make(&parts, NULL, &occluders, &failure));
     return occluders;
 }
 

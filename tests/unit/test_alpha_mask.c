@@ -5,7 +5,7 @@
 #include "rays.h"
 #include "shading.h"
 #include "testing.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 #include "truth/metrics.h"
 
 /* A disc of this radius in a square of side 2, as an alpha of this many texels: a ramp that is a half at the
@@ -310,7 +310,7 @@ TEST(bad_masks_are_refused) {
         c->mesh.mask = &bad[i];
         c->mesh.mask_uvs = i < 7 ? c->uvs : NULL;
         vshi_triangles *triangles = NULL;
-        assert_fails(vshi_triangles_create(&c->mesh, 1, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT,
+        assert_fails(vshi_triangles_create(&c->mesh, 1, NULL, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT,
                      "'card'");
         assert_null(triangles);
     }

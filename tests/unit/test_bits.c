@@ -478,7 +478,7 @@ static void exact(const context *c, int32_t what, bits *b) {
     options.resolution = (what & CUT_OUT) != 0 ? 16 : 64;
     assert_ok(vsh_grid_from_meshes(&mesh, 1, &options, &c->run, &grid, &failure));
     assert_ok(vshi_field_create(grid, NULL, &c->run, &here.field, &failure));
-    assert_ok(vshi_triangles_create(&mesh, 1, &c->run, &triangles, &failure));
+    assert_ok(vshi_triangles_create(&mesh, 1, NULL, &c->run, &triangles, &failure));
     vsh_shade_options shading = preview_options();
     shading.method = VSH_SHADOW_EXACT;
     shading.ao_method = VSH_AO_EXACT;

@@ -4,7 +4,7 @@
 #include "handles.h"
 
 #include "base/vec.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 /* A card of CELLS × CELLS quads in the plane y = 1, from -1 to 1, the image's top at z = -1; on it a disc. */
 enum { CELLS = 8, CORNERS = (CELLS + 1) * (CELLS + 1), TRIANGLES = 2 * CELLS * CELLS, TEXELS = 160 };

@@ -9,7 +9,7 @@
 #include "geometry/solidity.h"
 #include "scene/scene.h"
 #include "shapes/heights.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 #include "traced.h"
 #include <vdbshade/occluders.h>
 #include <vdbshade/scene.h>

@@ -1,7 +1,7 @@
 /* Meshes with smooth normals: where shadow rays begin, and which directions count for AO. The truth is that
  * of the facets. */
 #include "casts.h"
-#include "lightmap/origins.h"
+#include "lightmap/page.h"
 #include "lightmap/texels.h"
 #include "rays.h"
 #include "shading.h"

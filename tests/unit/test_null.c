@@ -122,7 +122,7 @@ static vsh_occluders *no_casters(void) {
     vshi_occluder_parts parts = {.field = NULL};
     parts.voxel_size = 1.0;
     vsh_occluders *casters = NULL;
-    assert_int_equal(vshi_occluders_from_parts(&parts, &casters, &error), VSH_OK);
+    assert_int_equal(vshi_occluders_make(&parts, NULL, &casters, &error), VSH_OK);
     return casters;
 }
 

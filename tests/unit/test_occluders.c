@@ -70,7 +70,7 @@ static vshi_spheres *unit_sphere(void) {
 
 static void expect_refused(const vshi_occluder_parts *parts, const char *text) {
     vsh_occluders *made = (vsh_occluders *)&failure;
-    assert_fails(vshi_occluders_from_parts(parts, &made, &failure), VSH_ERROR_ARGUMENT, text);
+    assert_fails(vshi_occluders_make(parts, NULL, &made, &failure), VSH_ERROR_ARGUMENT, text);
     assert_null(made);
 }
 
@@ -109,7 +109,7 @@ TEST(layers_without_a_field_define_the_unit_of_offsets) {
         parts.layer_count = cases[i].layers;
         parts.voxel_size = cases[i].given;
         OWNED(vsh_occluders) *made = NULL;
-        assert_ok(vshi_occluders_from_parts(&parts, &made, &failure));
+        assert_ok(vshi_occluders_make(&parts, NULL, &made, &failure));
         const vshi_occluder_parts views = parts_of(made);
         assert_int_equal(views.layer_count, cases[i].layers);
         assert_true(field_info(views.field).voxel_size == cases[i].expected);
@@ -584,7 +584,7 @@ TEST(layers_out_of_range_are_refused) {
         parts.layers = &layer;
         parts.layer_count = 1;
         OWNED(vsh_occluders) *made = NULL;
-        vsh_result result = vshi_occluders_from_parts(&parts, &made, &failure);
+        vsh_result result = vshi_occluders_make(&parts, NULL, &made, &failure);
         if (result == VSH_OK) { /* only the call knows the method */
             result = vsh_shade_shadow(made, &points, &light, NULL, NULL, &value, NULL, NULL, &failure);
         }

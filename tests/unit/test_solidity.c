@@ -5,7 +5,7 @@
 #include "shade/shade.h"
 #include "shapes.h"
 #include "testing.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 #include "traced.h"
 
 OWNER(vshi_solidity)

@@ -3,7 +3,7 @@
 #include "testing.h"
 
 #include "field/field.h"
-#include "trace/embree.h"
+#include "trace/trace.h"
 
 #define VOXEL 0.04
 

@@ -4,7 +4,7 @@
 #include "shading.h"
 #include "testing.h"
 
-#include "trace/embree.h"
+#include "trace/trace.h"
 #include "truth/directions.h"
 
 #include <pthread.h>
@@ -376,7 +376,7 @@ TEST(trees_are_made_by_the_threads_that_were_given) {
         vsh_run run = run_watched(note_thread, &w);
         run.threads = 1;
         vshi_triangles *triangles = NULL;
-        assert_ok(vshi_triangles_create(&mesh, 1, &run, &triangles, &failure));
+        assert_ok(vshi_triangles_create(&mesh, 1, NULL, &run, &triangles, &failure));
         vshi_triangles_free(triangles);
         assert_true(w.calls > 2); /* from within the making too */
         assert_int_equal(w.others, 0);
@@ -426,11 +426,11 @@ TEST(bad_triangles_are_refused) {
     const vsh_mesh mesh = ball(0.0, 0.0, 0.0);
     vshi_triangles *triangles = NULL;
     const vsh_run small = run_within(1 << 20);
-    assert_fails(vshi_triangles_create(&mesh, 1, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vshi_triangles_create(&mesh, 1, NULL, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
     const uint32_t wrong[3] = {0, 1, 99};
     const float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const vsh_mesh bad = mesh_of_arrays(NULL, corners, NULL, 3, wrong, 1);
-    assert_fails(vshi_triangles_create(&bad, 1, NULL, &triangles, &failure), VSH_ERROR_INPUT, "");
+    assert_fails(vshi_triangles_create(&bad, 1, NULL, NULL, &triangles, &failure), VSH_ERROR_INPUT, "");
     assert_null(triangles);
 }
 
