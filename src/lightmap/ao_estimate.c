@@ -1,12 +1,60 @@
-/* Estimates AO of texels from their shots and their neighbours' shots. */
+/* AO of texels that share rays: keeps their shots, estimates each texel from its own and its neighbours'
+ * shots, and stores the values in planes. */
 #include "lightmap/page.h"
-
-#include "base/memory.h"
-#include "shade/ao.h"
+#include "lightmap/planes.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+/* --- shots */
+
+void vshi_shots_list(vshi_shots *shots, vshi_array arrays[VSHI_SHOT_ARRAYS]) {
+    const vshi_array list[VSHI_SHOT_ARRAYS] = {
+        {(void **)&shots->own.ao, 1, sizeof(float)},
+        {(void **)&shots->rays, 1, sizeof(int32_t)},
+        {(void **)&shots->level, 1, sizeof(uint8_t)},
+        {(void **)&shots->own.bent, 1, 3 * sizeof(float)},
+    };
+    memcpy(arrays, list, sizeof list);
+}
+
+vsh_result vshi_shots_open(vshi_page *page, vshi_shots *shots, bool bent, vsh_error *error) {
+    vshi_array arrays[VSHI_SHOT_ARRAYS + 1];
+    vshi_shots_list(shots, arrays);
+    for (size_t i = 0; i < VSHI_SHOT_ARRAYS; ++i) {
+        arrays[i].count = vshi_page_texels(page);
+    }
+    arrays[VSHI_SHOT_ARRAYS - 1].count *= bent;
+    arrays[VSHI_SHOT_ARRAYS] =
+        (vshi_array)VSHI_ARRAY(shots->compared, vshi_charts_tiles(&page->charts->sorted));
+    return vshi_page_take(page, arrays, VSHI_SHOT_ARRAYS + 1, "AO texels", error);
+}
+
+void vshi_shots_close(vshi_page *page, vshi_shots *shots) {
+    vshi_array arrays[VSHI_SHOT_ARRAYS];
+    for (size_t i = 0; shots->compared != NULL && i < vshi_charts_tiles(&page->charts->sorted); ++i) {
+        free(shots->compared[i].list);
+    }
+    vshi_store_give(page->store, shots->compared);
+    vshi_shots_list(shots, arrays);
+    for (size_t i = 0; i < VSHI_SHOT_ARRAYS; ++i) {
+        vshi_store_give(page->store, *arrays[i].memory);
+    }
+    *shots = (vshi_shots){.rays = NULL};
+}
+
+void vshi_shots_keep(const vshi_shots *shots, size_t place, size_t k, const vshi_ao_share *share,
+                     const vshi_ao_values *values) {
+    shots->level[place] = share->level[k];
+    shots->rays[place] = share->rays[k];
+    shots->own.ao[place] = values->ao[k];
+    if (values->bent != NULL) {
+        memcpy(shots->own.bent + 3 * place, values->bent + 3 * k, 3 * sizeof *values->bent);
+    }
+}
+
+/* --- the estimate */
 
 /* Cells of a lattice that are estimated together, with the cells around that their windows reach. */
 enum { TILES = 8, INNER = TILES * VSHI_CELL, WIDTH = INNER + 2 * VSHI_CELL, TEXELS = WIDTH * WIDTH };
@@ -20,12 +68,18 @@ typedef struct row_sum {
     uint64_t rays, refined, invalid;
 } row_sum;
 
+/* The plane of a texel's window (slopes for each texel of the page), and its error. */
+typedef struct ao_plane {
+    float slope[2], deviation, curved;
+} ao_plane;
+_Static_assert(sizeof(ao_plane) + sizeof(float) == VSHI_ESTIMATE_BYTES, "a plane and a value");
+
 typedef struct estimating {
     vshi_texel_map map;
     const vshi_shots *shots;
     const vsh_shade_options *shade;
     float *values, *bent;
-    vshi_ao_plane *planes;
+    ao_plane *planes;
     int32_t spacing; /* of the current lattice */
     row_sum *sums;   /* [rows of cells] */
 } estimating;
@@ -73,7 +127,7 @@ static void lay_out(const estimating *s, block *b) {
             rays = s->shots->rays[i];
             spread = (float)vshi_ao_shared_spread(sampler, rays);
         }
-        b->texels[k].value = s->shots->share[i];
+        b->texels[k].value = s->shots->own.ao[i];
         b->texels[k].rays = rays;
         b->texels[k].spread = spread;
     }
@@ -98,9 +152,9 @@ static void bend(const estimating *s, const block *b, const vshi_window_estimate
     for (int32_t row = e->y[0]; row <= e->y[1]; ++row) {
         for (int32_t column = e->x[0]; column <= e->x[1]; ++column) {
             const size_t i = b->at[row * WIDTH + column] - 1;
-            const float *open = s->shots->open + 3 * i, *normal = s->map.normal + 3 * i;
+            const float *open = s->shots->own.bent + 3 * i, *normal = s->map.normal + 3 * i;
             const double weight = vshi_window_weight(e, x, y, column, row);
-            const double even = VSHI_AO_OPEN * (double)s->shots->share[i];
+            const double even = VSHI_AO_OPEN * (double)s->shots->own.ao[i];
             for (size_t axis = 0; axis < 3; ++axis) {
                 sum[axis] += weight * ((double)open[axis] - even * (double)normal[axis]);
             }
@@ -134,7 +188,7 @@ static void estimate_own(const estimating *s, const block *b) {
             const size_t i = at - 1;
             const vshi_window_estimate e = estimate(s, b, x, y);
             s->values[i] = (float)e.value;
-            s->planes[i] = (vshi_ao_plane){
+            s->planes[i] = (ao_plane){
                 {part * (float)e.slope[0], part * (float)e.slope[1]}, (float)e.deviation, (float)e.curved};
             if (s->bent != NULL) {
                 bend(s, b, &e, x, y, s->bent + 3 * i);
@@ -206,7 +260,7 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
             continue;
         }
         const size_t corner = c->corner[k];
-        const vshi_ao_plane *p = &s->planes[corner];
+        const ao_plane *p = &s->planes[corner];
         const double weight = (k & 1 ? u : 1.0 - u) * (k >> 1 ? v : 1.0 - v);
         const int32_t x = dx - (k & 1) * s->spacing, y = dy - (k >> 1) * s->spacing;
         const double at = (double)s->values[corner] + (double)p->slope[0] * x + (double)p->slope[1] * y;
@@ -225,7 +279,7 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
         return;
     }
     s->values[i] = (float)(value / sum);
-    s->planes[i] = (vshi_ao_plane){{0.0f, 0.0f}, (float)(deviation / sum), (float)(curved / sum)};
+    s->planes[i] = (ao_plane){{0.0f, 0.0f}, (float)(deviation / sum), (float)(curved / sum)};
     for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
         s->bent[3 * i + axis] =
             (float)(VSHI_AO_OPEN * (double)s->values[i] * (double)s->map.normal[3 * i + axis] +
@@ -269,11 +323,11 @@ static vsh_result sum_row(void *user, size_t row, vsh_error *error) {
     (void)error;
     for (size_t i = row * VSHI_CELL * width; i < end && i < all; ++i) {
         if (s->shots->level[i] == VSHI_AO_KNOWN_LEVEL) {
-            const float value = s->shots->share[i];
+            const float value = s->shots->own.ao[i];
             s->values[i] = value;
-            s->planes[i] = (vshi_ao_plane){.deviation = isnan(value) ? NAN : 0.0f};
+            s->planes[i] = (ao_plane){.deviation = isnan(value) ? NAN : 0.0f};
             for (size_t axis = 0; axis < 3 && s->bent != NULL; ++axis) {
-                s->bent[3 * i + axis] = s->shots->open[3 * i + axis];
+                s->bent[3 * i + axis] = s->shots->own.bent[3 * i + axis];
             }
             sum->invalid += isnan(value);
         } else if (s->shots->level[i] != 0) {
@@ -318,9 +372,9 @@ static vsh_result run_estimate(estimating *s, int32_t spacing, vshi_job *job, vs
     return vshi_parallel_each(job, rows, 1, 1, sum_row, s, error);
 }
 
-vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, float *values,
-                            vshi_ao_plane *planes, float *bent, const vsh_run *run, vsh_shade_stats *stats,
-                            vsh_error *error) {
+static vsh_result estimate_all(const vshi_page *page, const vshi_shots *shots, float *values,
+                               ao_plane *planes, float *bent, const vsh_run *run, vsh_shade_stats *stats,
+                               vsh_error *error) {
     const size_t rows = (page->height + VSHI_CELL - 1) / VSHI_CELL;
     estimating s = {.map = {.width = (int32_t)page->width,
                             .height = (int32_t)page->height,
@@ -342,4 +396,103 @@ done:
     free(s.sums);
     vshi_job_end(job);
     return result;
+}
+
+/* --- bent normals */
+
+/* Turns a direction into the tangent space of a normal and a tangent. */
+static void turn_to_tangent(const float *normal, const float *given, float *bent) {
+    const vshi_vec n = vshi_unit(vshi_vec_off(normal));
+    vshi_vec t = vshi_vec_off(given), b;
+    t = vshi_sub(t, vshi_scale(n, vshi_dot(n, t)));
+    if (!(vshi_dot(t, t) > 0.0)) {
+        vshi_frame(n, &t, &b);
+    }
+    t = vshi_unit(t);
+    b = vshi_scale(vshi_cross(n, t), (double)given[3]);
+    const vshi_vec d = vshi_vec_off(bent);
+    vshi_vec_to_floats((vshi_vec){vshi_dot(d, t), vshi_dot(d, b), vshi_dot(d, n)}, bent);
+}
+
+void vshi_bent_normal(const float *normal, const float *tangent, float *bent) {
+    vshi_ao_bent(bent, normal);
+    if (tangent != NULL) {
+        turn_to_tangent(normal, tangent, bent);
+    }
+}
+
+void vshi_bent_normalize(float *bent) {
+    vshi_vec_to_floats(vshi_unit(vshi_vec_off(bent)), bent);
+}
+
+/* --- values in planes */
+
+/* Stores a texel's value in its planes. */
+static void store_ao(const vshi_page *page, size_t i, float value, const ao_plane *plane, float *bent) {
+    const vsh_lightmap *planes = &page->lightmap;
+    if (planes->ao != NULL) {
+        planes->ao[i] = 0.0f + value; /* -0 becomes 0 */
+    }
+    if (planes->ao_error != NULL) {
+        planes->ao_error[i] = plane->deviation;
+    }
+    if (bent != NULL) {
+        vshi_bent_normal(page->normal + 3 * i, page->tangent != NULL ? page->tangent + 4 * i : NULL,
+                         bent + 3 * i);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            planes->bent[3 * i + axis] = 0.0f + bent[3 * i + axis];
+        }
+        vshi_bent_normalize(planes->bent + 3 * i);
+    }
+}
+
+static void store_values(const vshi_page *page, const vshi_shots *shots, float *values,
+                         const ao_plane *planes, float *bent) {
+    const bool sky = shots == &page->sky;
+    double up[3] = {0.0, 0.0, 0.0};
+    if (sky) {
+        vshi_sky_up(page->lightmap.asked.sky, up);
+    }
+    for (size_t i = 0; i < vshi_page_texels(page); ++i) {
+        if (shots->level[i] == 0) {
+            continue;
+        }
+        if (isnan(values[i])) {
+            page->state[i] = VSHI_TEXEL_INVALID;
+        } else if (sky) {
+            values[i] = vshi_sky_weighed(page->normal + 3 * i, up, values[i]);
+            page->lightmap.sky[i] = 0.0f + values[i];
+        } else {
+            store_ao(page, i, values[i], &planes[i], bent);
+        }
+    }
+}
+
+vsh_result vshi_ao_estimate(vshi_page *page, const vshi_shots *shots, size_t index, const vsh_run *run,
+                            vsh_bake_stats *stats, vsh_error *error) {
+    const size_t texels = vshi_page_texels(page);
+    float *values = NULL, *bent = NULL;
+    ao_plane *planes = NULL;
+    const vshi_array arrays[] = {VSHI_ARRAY(values, texels), VSHI_ARRAY(planes, texels),
+                                 VSHI_ARRAY(bent, shots->own.bent != NULL ? 3 * texels : 0)};
+    VSHI_TRY(vshi_page_take(page, arrays, sizeof arrays / sizeof *arrays, "AO texels", error));
+    vsh_shade_stats own = vsh_shade_stats_zero();
+    VSHI_TRY(estimate_all(page, shots, values, planes, bent, run, &own, error));
+    vshi_shade_stats_add(&stats->shade, &own);
+    store_values(page, shots, values, planes, bent);
+    if (stats->errors != NULL) {
+        stats->errors[index].square_error += own.square_error;
+        stats->errors[index].worst = fmax(stats->errors[index].worst, own.worst_error);
+        for (size_t tile = 0; tile < vshi_charts_tiles(&page->charts->sorted); ++tile) {
+            const vshi_compared_texels *compared = &shots->compared[tile];
+            for (const vshi_compared_texel *t = compared->list; t < compared->list + compared->count; ++t) {
+                vshi_field_error_settle(t, page->shade.max_error, values[vshi_page_place(page, t->texel)],
+                                        &stats->errors[index]);
+            }
+        }
+    }
+    vshi_store_give(page->store, bent);
+    vshi_store_give(page->store, planes);
+    vshi_store_give(page->store, values);
+    return VSH_OK;
 }

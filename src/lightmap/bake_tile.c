@@ -547,8 +547,8 @@ static void trace_ao(const tracing *t, work *w, size_t tile, bool sky) {
     const bool bent = !sky && planes->bent != NULL;
     const vsh_points points = place_points(t, w, NULL, tracer->traces_ao);
     const channel c = begin_channel(t, tile, tracer->light_count + sky);
-    vshi_ao_points(sky ? &tracer->sky : &tracer->ao, &points, faces_of(t, w), w->values, w->deviation,
-                   bent ? w->vectors : NULL, c.stats);
+    const vshi_ao_values values = {w->values, w->deviation, bent ? w->vectors : NULL};
+    vshi_ao_points(sky ? &tracer->sky : &tracer->ao, &points, faces_of(t, w), &values, c.stats);
     if (sky) { /* the error of rays is that before the weighing, which makes it less */
         double up[3];
         vshi_sky_up(planes->asked.sky, up);
@@ -592,18 +592,14 @@ static vshi_texel_map lay_out(const tracing *t, work *w, size_t tile) {
 }
 
 /* Stores the shots in the page. */
-static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, vshi_shots *shots, size_t index,
-                             vsh_error *error) {
+static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, const vshi_ao_share *share,
+                             const vshi_ao_values *values, bool sky, vsh_error *error) {
     vshi_page *page = t->page;
+    const vshi_shots *shots = sky ? &page->sky : &page->ao;
+    const size_t index = t->tracer->light_count + sky;
     const bool keeps = keeps_error(&t->tracer->shade, false);
     for (size_t k = 0; k < w->origins.count; ++k) {
-        const size_t place = place_of(t, w, k);
-        shots->level[place] = w->level[k];
-        shots->rays[place] = w->rays[k];
-        shots->share[place] = w->values[k];
-        if (shots->open != NULL) {
-            memcpy(shots->open + 3 * place, w->vectors + 3 * k, 3 * sizeof *shots->open);
-        }
+        vshi_shots_keep(shots, place_of(t, w, k), k, share, values);
         vshi_page_note(page, &w->samples, w->origins.sample[k]);
     }
     page->errors[tile * page->error_count + index].values += keeps ? (double)w->origins.count : 0.0;
@@ -623,7 +619,6 @@ static vsh_result keep_shots(const tracing *t, const work *w, size_t tile, vshi_
 
 static vsh_result shoot_ao(const tracing *t, work *w, size_t tile, bool sky, vsh_error *error) {
     const vshi_tracer *tracer = t->tracer;
-    vshi_shots *shots = sky ? &t->page->sky : &t->page->ao;
     const vsh_points points = place_points(t, w, NULL, tracer->traces_ao);
     const size_t all = w->origins.count + w->origins.frame;
     memset(w->rays, 0, all * sizeof *w->rays);
@@ -636,9 +631,10 @@ static vsh_result shoot_ao(const tracing *t, work *w, size_t tile, bool sky, vsh
                                  .rays = w->rays,
                                  .level = w->level};
     vsh_shade_stats stats = vsh_shade_stats_zero(); /* the estimate counts its rays */
-    vshi_ao_shoot(sky ? &tracer->sky : &tracer->ao, &points, faces_of(t, w), &share, w->values,
-                  shots->open != NULL ? w->vectors : NULL, &stats);
-    return keep_shots(t, w, tile, shots, tracer->light_count + sky, error);
+    const bool bent = (sky ? &t->page->sky : &t->page->ao)->own.bent != NULL;
+    const vshi_ao_values values = {.ao = w->values, .bent = bent ? w->vectors : NULL};
+    vshi_ao_shoot(sky ? &tracer->sky : &tracer->ao, &points, faces_of(t, w), &share, &values, &stats);
+    return keep_shots(t, w, tile, &share, &values, sky, error);
 }
 
 /* --- all of a tile */
@@ -737,7 +733,7 @@ vsh_result vshi_trace_tiles(const vshi_tracer *tracer, vshi_page *page, const ui
     tracing t = {.tracer = tracer,
                  .page = page,
                  .tiles = tiles,
-                 .shares = page->ao.share != NULL || page->sky.share != NULL,
+                 .shares = page->ao.own.ao != NULL || page->sky.own.ao != NULL,
                  .rows = rows_of(page->charts),
                  .job = job,
                  .work_count = threads < count ? threads : count};

@@ -10,33 +10,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- bent normals */
-
-/* Turns a direction into the tangent space of a normal and a tangent. */
-static void turn_to_tangent(const float *normal, const float *given, float *bent) {
-    const vshi_vec n = vshi_unit(vshi_vec_off(normal));
-    vshi_vec t = vshi_vec_off(given), b;
-    t = vshi_sub(t, vshi_scale(n, vshi_dot(n, t)));
-    if (!(vshi_dot(t, t) > 0.0)) {
-        vshi_frame(n, &t, &b);
-    }
-    t = vshi_unit(t);
-    b = vshi_scale(vshi_cross(n, t), (double)given[3]);
-    const vshi_vec d = vshi_vec_off(bent);
-    vshi_vec_to_floats((vshi_vec){vshi_dot(d, t), vshi_dot(d, b), vshi_dot(d, n)}, bent);
-}
-
-void vshi_bent_normal(const float *normal, const float *tangent, float *bent) {
-    vshi_ao_bent(bent, normal);
-    if (tangent != NULL) {
-        turn_to_tangent(normal, tangent, bent);
-    }
-}
-
-void vshi_bent_normalize(float *bent) {
-    vshi_vec_to_floats(vshi_unit(vshi_vec_off(bent)), bent);
-}
-
 /* --- memory */
 
 bool vshi_ao_is_shared(const vsh_shade_options *shade, int32_t spacing, bool layered_ao) {
@@ -44,25 +17,13 @@ bool vshi_ao_is_shared(const vsh_shade_options *shade, int32_t spacing, bool lay
            (vsh_method_traits(VSH_NAMES_AO, shade->ao_method) & VSH_METHOD_KEEPS_ERROR) != 0;
 }
 
-/* Allocates arrays in a store. */
-static vsh_result allocate_stored(vshi_store *store, const vshi_array *arrays, size_t count, const char *what,
-                                  vsh_error *error) {
+vsh_result vshi_page_take(const vshi_page *page, const vshi_array *arrays, size_t count, const char *what,
+                          vsh_error *error) {
     for (size_t i = 0; i < count; ++i) {
-        VSHI_TRY(vshi_store_take(store, arrays[i].memory, arrays[i].count, arrays[i].size, what, error));
+        VSHI_TRY(
+            vshi_store_take(page->store, arrays[i].memory, arrays[i].count, arrays[i].size, what, error));
     }
     return VSH_OK;
-}
-
-static vsh_result allocate_shots(vshi_page *page, vshi_shots *shots, bool open, vsh_error *error) {
-    const size_t texels = vshi_page_texels(page);
-    const vshi_array arrays[] = {
-        VSHI_ARRAY(shots->share, texels),
-        VSHI_ARRAY(shots->rays, texels),
-        VSHI_ARRAY(shots->level, texels),
-        VSHI_ARRAY(shots->open, open ? 3 * texels : 0),
-        VSHI_ARRAY(shots->compared, vshi_charts_tiles(&page->charts->sorted)),
-    };
-    return allocate_stored(page->store, arrays, sizeof arrays / sizeof *arrays, "AO texels", error);
 }
 
 vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap, size_t light_count,
@@ -89,11 +50,11 @@ vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap
         VSHI_ARRAY(page->normal, ao || sky ? 3 * texels : 0),
         VSHI_ARRAY(page->tangent, tangents ? 4 * texels : 0),
     };
-    VSHI_TRY(allocate_stored(store, arrays, sizeof arrays / sizeof *arrays, "lightmap", error));
+    VSHI_TRY(vshi_page_take(page, arrays, sizeof arrays / sizeof *arrays, "lightmap", error));
     if (ao) {
-        VSHI_TRY(allocate_shots(page, &page->ao, lightmap->bent != NULL, error));
+        VSHI_TRY(vshi_shots_open(page, &page->ao, lightmap->bent != NULL, error));
     }
-    return sky ? allocate_shots(page, &page->sky, false, error) : VSH_OK;
+    return sky ? vshi_shots_open(page, &page->sky, false, error) : VSH_OK;
 }
 
 double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes, size_t light_count,
@@ -108,9 +69,8 @@ double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes,
     }
     const bool ao = shared && (need & VSHI_NEEDS_AO) != 0, sky = shared && (need & VSHI_NEEDS_OPEN) != 0;
     const double shots = sizeof(float) + sizeof(int32_t) + 1.0, place = 6.0 * sizeof(float);
-    const double estimate = sizeof(vshi_ao_plane) + sizeof(float);
     double own = 1.0 + sizeof(uint32_t);
-    own += (ao || sky ? place + estimate : 0.0) + (ao ? shots : 0.0) + (sky ? shots : 0.0);
+    own += (ao || sky ? place + VSHI_ESTIMATE_BYTES : 0.0) + (ao ? shots : 0.0) + (sky ? shots : 0.0);
     own += ao && planes->bent != NULL ? 10.0 * sizeof(float) : 0.0;
     const double filling =
         2.0 + 1.0 + sizeof(uint32_t) + 17.0 / 3.0; /* padding, invalid texels, mip levels */
@@ -118,21 +78,9 @@ double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes,
     return texels * ((double)floats * sizeof(float) + fmax(own, 1.0 + sizeof(uint32_t) + filling));
 }
 
-static void free_shots(vshi_page *page, vshi_shots *shots) {
-    for (size_t i = 0; shots->compared != NULL && i < vshi_charts_tiles(&page->charts->sorted); ++i) {
-        free(shots->compared[i].list);
-    }
-    vshi_store_give(page->store, shots->compared);
-    vshi_store_give(page->store, shots->open);
-    vshi_store_give(page->store, shots->level);
-    vshi_store_give(page->store, shots->rays);
-    vshi_store_give(page->store, shots->share);
-    *shots = (vshi_shots){.share = NULL};
-}
-
 void vshi_page_close_shots(vshi_page *page) {
-    free_shots(page, &page->sky);
-    free_shots(page, &page->ao);
+    vshi_shots_close(page, &page->sky);
+    vshi_shots_close(page, &page->ao);
     vshi_store_give(page->store, page->tangent);
     vshi_store_give(page->store, page->normal);
     vshi_store_give(page->store, page->position);
@@ -193,78 +141,6 @@ static void add_tiles(const vshi_page *page, vsh_bake_stats *stats) {
             }
         }
     }
-}
-
-/* --- AO that texels share */
-
-/* Stores a texel's value in its planes. */
-static void store_ao(const vshi_page *page, size_t i, float value, const vshi_ao_plane *plane, float *bent) {
-    const vsh_lightmap *planes = &page->lightmap;
-    if (planes->ao != NULL) {
-        planes->ao[i] = 0.0f + value; /* -0 becomes 0 */
-    }
-    if (planes->ao_error != NULL) {
-        planes->ao_error[i] = plane->deviation;
-    }
-    if (bent != NULL) {
-        vshi_bent_normal(page->normal + 3 * i, page->tangent != NULL ? page->tangent + 4 * i : NULL,
-                         bent + 3 * i);
-        for (size_t axis = 0; axis < 3; ++axis) {
-            planes->bent[3 * i + axis] = 0.0f + bent[3 * i + axis];
-        }
-        vshi_bent_normalize(planes->bent + 3 * i);
-    }
-}
-
-static void store_values(const vshi_page *page, const vshi_shots *shots, float *values,
-                         const vshi_ao_plane *planes, float *bent) {
-    const bool sky = shots == &page->sky;
-    double up[3] = {0.0, 0.0, 0.0};
-    if (sky) {
-        vshi_sky_up(page->lightmap.asked.sky, up);
-    }
-    for (size_t i = 0; i < vshi_page_texels(page); ++i) {
-        if (shots->level[i] == 0) {
-            continue;
-        }
-        if (isnan(values[i])) {
-            page->state[i] = VSHI_TEXEL_INVALID;
-        } else if (sky) {
-            values[i] = vshi_sky_weighed(page->normal + 3 * i, up, values[i]);
-            page->lightmap.sky[i] = 0.0f + values[i];
-        } else {
-            store_ao(page, i, values[i], &planes[i], bent);
-        }
-    }
-}
-
-static vsh_result estimate(vshi_page *page, const vshi_shots *shots, size_t index, const vsh_run *run,
-                           vsh_bake_stats *stats, vsh_error *error) {
-    const size_t texels = vshi_page_texels(page);
-    float *values = NULL, *bent = NULL;
-    vshi_ao_plane *planes = NULL;
-    const vshi_array arrays[] = {VSHI_ARRAY(values, texels), VSHI_ARRAY(planes, texels),
-                                 VSHI_ARRAY(bent, shots->open != NULL ? 3 * texels : 0)};
-    VSHI_TRY(allocate_stored(page->store, arrays, sizeof arrays / sizeof *arrays, "AO texels", error));
-    vsh_shade_stats own = vsh_shade_stats_zero();
-    VSHI_TRY(vshi_ao_estimate(page, shots, values, planes, bent, run, &own, error));
-    vshi_shade_stats_add(&stats->shade, &own);
-    store_values(page, shots, values, planes, bent);
-    if (stats->errors != NULL) {
-        stats->errors[index].square_error += own.square_error;
-        stats->errors[index].worst = fmax(stats->errors[index].worst, own.worst_error);
-        for (size_t tile = 0; tile < vshi_charts_tiles(&page->charts->sorted); ++tile) {
-            const vshi_compared_texels *compared = &shots->compared[tile];
-            for (const vshi_compared_texel *t = compared->list; t < compared->list + compared->count; ++t) {
-                vshi_field_error_settle(t, page->shade.max_error, values[vshi_page_place(page, t->texel)],
-                                        &stats->errors[index]);
-            }
-        }
-    }
-    vshi_store_give(page->store, bent);
-    vshi_store_give(page->store, planes);
-    vshi_store_give(page->store, values);
-    return VSH_OK;
 }
 
 /* --- planes that are put together */
@@ -338,11 +214,11 @@ vsh_result vshi_page_finish(vshi_page *page, const vsh_run *run, vsh_bake_stats 
     vshi_plane_kinds(&kind_count);
     const uint64_t invalid = stats->invalid_texels;
     add_tiles(page, stats);
-    if (page->ao.share != NULL) {
-        VSHI_TRY(estimate(page, &page->ao, page->light_count, run, stats, error));
+    if (page->ao.own.ao != NULL) {
+        VSHI_TRY(vshi_ao_estimate(page, &page->ao, page->light_count, run, stats, error));
     }
-    if (page->sky.share != NULL) {
-        VSHI_TRY(estimate(page, &page->sky, page->light_count + 1, run, stats, error));
+    if (page->sky.own.ao != NULL) {
+        VSHI_TRY(vshi_ao_estimate(page, &page->sky, page->light_count + 1, run, stats, error));
     }
     add_ambient(page);
     set_coverage(page, stats);

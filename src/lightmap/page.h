@@ -3,8 +3,7 @@
 
 #include "lightmap/padding.h"
 #include "lightmap/texels.h"
-#include "shade/shade.h"
-#include "shade/window.h"
+#include "shade/ao.h"
 #include "shapes/heights.h"
 #include "shapes/spheres.h"
 
@@ -102,10 +101,10 @@ typedef struct vshi_compared_texels {
 
 /* Results of the AO or sky rays that texels share. */
 typedef struct vshi_shots {
-    float *share;   /* [height][width]: free share of a texel's own rays; NULL: nothing is shared */
-    int32_t *rays;  /* [height][width] */
-    uint8_t *level; /* [height][width]: vshi_ao_share's; 0: there is no valid texel */
-    float *open;    /* [height][width][3]: their bent, as in vshi_ao_task; NULL: not wanted */
+    vshi_ao_values own; /* [height][width]: of a texel's own rays, without deviations; `ao` NULL: nothing is
+                         * shared */
+    int32_t *rays;      /* [height][width] */
+    uint8_t *level;     /* [height][width]: vshi_ao_share's; 0: there is no valid texel */
     vshi_compared_texels *compared; /* [tiles] */
 } vshi_shots;
 
@@ -133,6 +132,10 @@ vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap
                           const vsh_shade_options *shade, bool shared, vshi_store *store, vshi_page *page,
                           vsh_error *error);
 void vshi_page_close(vshi_page *page);
+
+/* Allocates arrays in a page's store. Errors: as vshi_store_take(). */
+vsh_result vshi_page_take(const vshi_page *page, const vshi_array *arrays, size_t count, const char *what,
+                          vsh_error *error);
 
 /* Frees the arrays that only vshi_page_finish() needs. */
 void vshi_page_close_shots(vshi_page *page);
@@ -176,13 +179,6 @@ vsh_result vshi_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightma
 /* Adds the errors of tiles, or of lightmaps. */
 void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more);
 
-/* Turns a mean of open directions, as in vshi_ao_task, into a unit bent normal: in the tangent space of a
- * tangent [4], or (NULL) in world space. */
-void vshi_bent_normal(const float *normal, const float *tangent, float *bent);
-
-/* Makes a mean of bent normals a unit vector. */
-void vshi_bent_normalize(float *bent);
-
 /* --- tracing tiles (bake_tile.c) */
 
 /* Shared by all tiles of a bake. */
@@ -206,18 +202,34 @@ double vshi_trace_bytes(const vsh_charts *charts, int32_t threads);
 vsh_result vshi_trace_tiles(const vshi_tracer *tracer, vshi_page *page, const uint32_t *tiles, size_t count,
                             vshi_job *job, vsh_error *error);
 
-/* --- AO of texels that share rays, estimated from their own rays and their neighbours' (ao_estimate.c) */
+/* --- AO of texels that share rays: their shots, the estimate, and values in planes (ao_estimate.c) */
 
-/* The plane of a texel's window (slopes for each texel of the page), and its error. */
-typedef struct vshi_ao_plane {
-    float slope[2], deviation, curved;
-} vshi_ao_plane;
+/* Allocates shots of a page. `bent`: with bent normals. Errors: as vshi_store_take(). */
+vsh_result vshi_shots_open(vshi_page *page, vshi_shots *shots, bool bent, vsh_error *error);
+void vshi_shots_close(vshi_page *page, vshi_shots *shots);
 
-/* Sets values and planes [height][width] of all texels with a level, and unless NULL bent [height][width][3],
- * the mean of their open directions. Adds to *stats. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-vsh_result vshi_ao_estimate(const vshi_page *page, const vshi_shots *shots, float *values,
-                            vshi_ao_plane *planes, float *bent, const vsh_run *run, vsh_shade_stats *stats,
-                            vsh_error *error);
+/* Lists the arrays of shots by texel, with the bytes of a texel; those not wanted are NULL. */
+enum { VSHI_SHOT_ARRAYS = 4 };
+void vshi_shots_list(vshi_shots *shots, vshi_array arrays[VSHI_SHOT_ARRAYS]);
+
+/* Stores what origin `k` of a tile shot, and its level. */
+void vshi_shots_keep(const vshi_shots *shots, size_t place, size_t k, const vshi_ao_share *share,
+                     const vshi_ao_values *values);
+
+/* Bytes of a texel while shots are estimated, beside its shots and its place. */
+enum { VSHI_ESTIMATE_BYTES = 5 * sizeof(float) };
+
+/* Estimates all texels with a level, and sets their planes. `index` is the channel's in stats->errors.
+ * Errors: as vshi_store_take(); VSH_ERROR_CANCELLED. */
+vsh_result vshi_ao_estimate(vshi_page *page, const vshi_shots *shots, size_t index, const vsh_run *run,
+                            vsh_bake_stats *stats, vsh_error *error);
+
+/* Turns a mean of open directions, as in vshi_ao_task, into a unit bent normal: in the tangent space of a
+ * tangent [4], or (NULL) in world space. */
+void vshi_bent_normal(const float *normal, const float *tangent, float *bent);
+
+/* Makes a mean of bent normals a unit vector. */
+void vshi_bent_normalize(float *bent);
 
 /* --- errors of values against the casters, measured on some samples (field_error.c) */
 

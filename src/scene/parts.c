@@ -134,13 +134,10 @@ static vsh_result move_bytes(part_file *f, void *bytes, size_t size, vsh_error *
                     : vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: %s", f->path, why);
 }
 
-/* Whether a plane is set when the page is finished, not by its tiles. */
-static bool is_finished_later(const vshi_scene_page *page, const float *plane) {
-    const vsh_lightmap *planes = &page->channels.lightmap;
-    return plane == planes->coverage || plane == planes->invalid ||
-           (page->page.ao.share != NULL &&
-            (plane == planes->ao || plane == planes->ao_error || plane == planes->bent)) ||
-           (page->page.sky.share != NULL && plane == planes->sky);
+/* Whether planes of a kind are set when the page is finished, not by its tiles. */
+static bool is_finished_later(const vshi_page *page, const vshi_plane_kind *kind) {
+    return kind->needs == 0 || (kind->needs == VSHI_NEEDS_AO && page->ao.own.ao != NULL) ||
+           (kind->needs == VSHI_NEEDS_OPEN && page->sky.own.ao != NULL);
 }
 
 /* Texels of a tile: columns and rows from the first on. */
@@ -197,22 +194,20 @@ static vsh_result move_compared(part_file *f, const place *at, vshi_compared_tex
 
 static vsh_result move_shots(part_file *f, const vshi_scene_page *page, const place *at, size_t tile,
                              const vshi_shots *shots, vsh_error *error) {
-    if (shots->share == NULL) {
-        return VSH_OK;
+    vshi_shots of = *shots;
+    vshi_array arrays[VSHI_SHOT_ARRAYS];
+    vshi_shots_list(&of, arrays);
+    for (size_t i = 0; i < VSHI_SHOT_ARRAYS; ++i) {
+        if (*arrays[i].memory != NULL) {
+            VSHI_TRY(move_array(f, page, at, *arrays[i].memory, arrays[i].size, error));
+        }
     }
-    VSHI_TRY(move_array(f, page, at, shots->share, sizeof *shots->share, error));
-    VSHI_TRY(move_array(f, page, at, shots->rays, sizeof *shots->rays, error));
-    VSHI_TRY(move_array(f, page, at, shots->level, sizeof *shots->level, error));
-    if (shots->open != NULL) {
-        VSHI_TRY(move_array(f, page, at, shots->open, 3 * sizeof *shots->open, error));
-    }
-    return move_compared(f, at, &shots->compared[tile], error);
+    return of.compared != NULL ? move_compared(f, at, &of.compared[tile], error) : VSH_OK;
 }
 
 /* Reads or writes what vshi_trace_tiles() leaves of a tile. */
 static vsh_result move_tile(part_file *f, const vshi_scene_page *page, size_t tile, vsh_error *error) {
     const vshi_page *p = &page->page;
-    const vshi_channels *channels = &page->channels;
     const place at = find_place(page, tile);
     VSHI_TRY(move_bytes(f, &p->stats[tile], sizeof *p->stats, error));
     VSHI_TRY(move_bytes(f, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors, error));
@@ -222,10 +217,10 @@ static vsh_result move_tile(part_file *f, const vshi_scene_page *page, size_t ti
             return fail_damaged(f->path, "its tiles", error);
         }
     }
-    for (size_t i = 0; i < channels->value_count; ++i) {
-        if (!is_finished_later(page, channels->values[i])) {
-            VSHI_TRY(move_array(f, page, &at, channels->values[i], channels->components[i] * sizeof(float),
-                                error));
+    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(&p->lightmap, p->light_count, &c);) {
+        if (!is_finished_later(p, c.kind)) {
+            VSHI_TRY(
+                move_array(f, page, &at, c.values, vshi_plane_components(c.kind) * sizeof(float), error));
         }
     }
     VSHI_TRY(move_shots(f, page, &at, tile, &p->ao, error));

@@ -23,21 +23,19 @@ void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]) {
 }
 
 bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, vsh_shade_stats *stats) {
+    const vshi_vec invalid = {NAN, NAN, NAN};
     if (task->sphere) {
         frame->origin = vshi_to_field(task->field, task->points->positions + 3 * i);
         vshi_ao_axes((vshi_vec){0.0, 0.0, 1.0}, frame->axes);
         frame->grown = 0.0;
-        task->ao[i] = NAN;
+        vshi_ao_set(&task->values, i, NAN, NAN, invalid);
         stats->invalid += !vshi_finite(frame->origin);
         return vshi_finite(frame->origin);
     }
     vshi_vec normal;
     if (!vshi_shade_origin(task->field, task->points, i, vshi_shade_offset(task->field, &task->options),
                            &frame->origin, &normal)) {
-        task->ao[i] = NAN;
-        if (task->bent != NULL) {
-            vshi_vec_to_floats((vshi_vec){NAN, NAN, NAN}, task->bent + 3 * i);
-        }
+        vshi_ao_set(&task->values, i, NAN, NAN, invalid);
         ++stats->invalid;
         return false;
     }
@@ -74,7 +72,7 @@ static void shade_by_taps(const void *user, size_t begin, size_t end, vsh_shade_
         }
         stats->samples += 5;
         const double open = 1.0 - STRENGTH * occlusion;
-        task->ao[i] = (float)(open < 0.0 ? 0.0 : open);
+        task->values.ao[i] = (float)(open < 0.0 ? 0.0 : open);
     }
 }
 
@@ -265,13 +263,9 @@ static void shade_by_cones(const void *user, size_t begin, size_t end, vsh_shade
             const vshi_vec f = vshi_direction_to_field(task->field, vshi_ao_face(task, i, normal));
             face = (vshi_vec){vshi_dot(f, axis[0]), vshi_dot(f, axis[1]), vshi_dot(f, axis[2])};
         }
-        task->ao[i] = (float)open_share(cones, close + (i - begin) * count, face, &where);
-        if (task->bent != NULL) {
-            const double length = vshi_length(where);
-            const vshi_vec d = vshi_ao_direction(axis, where);
-            vshi_vec_to_floats(vshi_scale(vshi_direction_to_world(task->field, d), length),
-                               task->bent + 3 * i);
-        }
+        const float open = (float)open_share(cones, close + (i - begin) * count, face, &where);
+        const vshi_vec d = vshi_direction_to_world(task->field, vshi_ao_direction(axis, where));
+        vshi_ao_set(&task->values, i, open, NAN, vshi_scale(d, vshi_length(where)));
     }
 }
 
@@ -283,8 +277,8 @@ void vshi_ao_shade(const void *user, size_t begin, size_t end, vsh_shade_stats *
     vshi_shade_fn *shade = method == VSH_AO_TAPS    ? shade_by_taps
                            : method == VSH_AO_CONES ? shade_by_cones
                                                     : vshi_ao_by_rays;
-    for (size_t i = begin; task->deviation != NULL && i < end; ++i) {
-        task->deviation[i] = NAN;
+    for (size_t i = begin; task->values.deviation != NULL && i < end; ++i) {
+        task->values.deviation[i] = NAN;
     }
     for (size_t first = begin; first < end; first += VSHI_AO_GRAIN) {
         const size_t last = end - first < VSHI_AO_GRAIN ? end : first + VSHI_AO_GRAIN;
@@ -398,14 +392,12 @@ vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options 
     return result;
 }
 
-void vshi_ao_points(const vshi_ao_task *prepared, const vsh_points *points, const float *faces, float *ao,
-                    float *deviation, float *bent, vsh_shade_stats *stats) {
+void vshi_ao_points(const vshi_ao_task *prepared, const vsh_points *points, const float *faces,
+                    const vshi_ao_values *values, vsh_shade_stats *stats) {
     vshi_ao_task task = *prepared;
     task.points = points;
     task.faces = faces;
-    task.ao = ao;
-    task.deviation = deviation;
-    task.bent = bent;
+    task.values = *values;
     vshi_ao_shade(&task, 0, points->count, stats);
 }
 
@@ -427,9 +419,7 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
     VSHI_TRY_DONE(vshi_ao_open(occluders, options, (vshi_ao_shading){.bent = bent != NULL}, full_run.isa,
                                &task, error));
     task.points = points;
-    task.ao = ao;
-    task.deviation = deviation;
-    task.bent = bent;
+    task.values = (vshi_ao_values){ao, deviation, bent};
     const size_t grain = task.options.ao_method == VSH_AO_TAPS ? VSHI_CHUNK : VSHI_AO_GRAIN;
     VSHI_TRY_DONE(vshi_shade_run(&full_run, "ao", points->count, grain, vshi_ao_shade, &task, stats, error));
     for (size_t i = 0; bent != NULL && i < points->count; ++i) {

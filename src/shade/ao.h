@@ -63,6 +63,14 @@ static inline int32_t vshi_ao_tile_sampler(int32_t sampler) {
 
 /* --- the task */
 
+/* Values of AO at points: arrays [points]. */
+typedef struct vshi_ao_values {
+    float *ao;        /* the free share of the hemisphere */
+    float *deviation; /* standard error; may be NULL */
+    float *bent; /* [points][3]: mean open direction over the whole cosine-weighted hemisphere, world space
+                  * (2/3 of the normal under an open sky); may be NULL */
+} vshi_ao_values;
+
 typedef struct vshi_ao_task {
     const vsh_field *field;
     const vshi_triangles *triangles; /* of exact methods; else may be NULL */
@@ -79,11 +87,8 @@ typedef struct vshi_ao_task {
     const vsh_points *points;
     const float *faces; /* [count][3], unit: normals of the faces under points with smooth normals. Directions
                          * below the face do not count. NULL: the points' normals */
-    float *ao;
-    float *deviation;           /* may be NULL */
+    vshi_ao_values values;
     const vshi_ao_share *share; /* of texels that share their rays; NULL: each point has its own */
-    float *bent; /* [count][3]: mean open direction over the whole cosine-weighted hemisphere, world space
-                  * (2/3 of the normal under an open sky); may be NULL */
 } vshi_ao_task;
 
 /* How AO is shaded. */
@@ -106,14 +111,26 @@ vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_optio
                            vshi_ao_task *task, vsh_error *error);
 
 /* Shades points on the calling thread. Values depend only on the points and their order. Thread safe.
- * `faces`, `deviation` and `bent`, as in vshi_ao_task, may be NULL. */
-void vshi_ao_points(const vshi_ao_task *prepared, const vsh_points *points, const float *faces, float *ao,
-                    float *deviation, float *bent, vsh_shade_stats *stats);
+ * `faces`, as in vshi_ao_task, may be NULL. */
+void vshi_ao_points(const vshi_ao_task *prepared, const vsh_points *points, const float *faces,
+                    const vshi_ao_values *values, vsh_shade_stats *stats);
 
-/* Shoots the rays of a tile whose texels share them. Sets levels and rays of the tile's points, the free
- * share of their own rays `shot`, and `open`, their bent directions, unless it is NULL. */
+/* Shoots the rays of a tile whose texels share them. Sets levels and rays of the tile's points, and the
+ * values of their own rays, without deviations. */
 void vshi_ao_shoot(const vshi_ao_task *prepared, const vsh_points *points, const float *faces,
-                   const vshi_ao_share *share, float *shot, float *open, vsh_shade_stats *stats);
+                   const vshi_ao_share *share, const vshi_ao_values *values, vsh_shade_stats *stats);
+
+/* Sets the values of point i. */
+static inline void vshi_ao_set(const vshi_ao_values *values, size_t i, float ao, float deviation,
+                               vshi_vec bent) {
+    values->ao[i] = ao;
+    if (values->deviation != NULL) {
+        values->deviation[i] = deviation;
+    }
+    if (values->bent != NULL) {
+        vshi_vec_to_floats(bent, values->bent + 3 * i);
+    }
+}
 
 /* Shades by the options' method, and by the layers: a vshi_shade_fn of a vshi_ao_task. */
 vshi_shade_fn vshi_ao_shade;

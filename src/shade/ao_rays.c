@@ -107,7 +107,7 @@ static void trace(ray_piece *b) {
     for (size_t r = 0; r < b->traced_count; ++r) {
         point_rays *point = &b->points[b->traced[of[r]].owner];
         point->free += !blocked[r];
-        if (!blocked[r] && task->bent != NULL) {
+        if (!blocked[r] && task->values.bent != NULL) {
             point->open = vshi_add(point->open, b->traced[of[r]].direction);
         }
     }
@@ -239,7 +239,7 @@ static void shoot(ray_piece *b, uint32_t owner, vsh_shade_stats *stats) {
         for (int32_t i = 0; i < count; ++i) {
             const vshi_vec local =
                 vshi_dome_mirror(direction_of(b->task, &point->lean, disc[i]), point->mirror);
-            if (b->task->bent != NULL) {
+            if (b->task->values.bent != NULL) {
                 point->all = vshi_add(point->all, local);
             }
             if (b->exact) {
@@ -325,17 +325,9 @@ static void find_buried(const vshi_ao_task *task, size_t all, point_rays *points
     const vshi_open_field open = {task->field, at, OPEN * task->field->voxel_size};
     vshi_inside(task->triangles, count, positions, normals, NULL, &open, where);
     for (size_t k = 0; k < count; ++k) {
-        const size_t i = points[of[k]].index;
-        if (where[k] == VSHI_OUTSIDE) {
-            continue;
-        }
-        points[of[k]].next = 0;
-        task->ao[i] = 0.0f;
-        if (task->deviation != NULL) {
-            task->deviation[i] = 0.0f;
-        }
-        if (task->bent != NULL) {
-            vshi_vec_to_floats((vshi_vec){0.0, 0.0, 0.0}, task->bent + 3 * i);
+        if (where[k] != VSHI_OUTSIDE) {
+            points[of[k]].next = 0;
+            vshi_ao_set(&task->values, points[of[k]].index, 0.0f, 0.0f, (vshi_vec){0.0, 0.0, 0.0});
         }
     }
 }
@@ -407,8 +399,8 @@ static void open_points(ray_piece *piece, const vshi_ao_task *task, const size_t
 static bool in_packets(const ray_piece *b, const point_rays *point) {
     const vshi_ao_task *task = b->task;
     const vshi_vec o = point->world_origin;
-    return b->exact && !task->sphere && task->bent == NULL && task->options.sampler == VSH_SAMPLER_SOBOL &&
-           vshi_dot(point->mirror, point->mirror) == 0.0 &&
+    return b->exact && !task->sphere && task->values.bent == NULL &&
+           task->options.sampler == VSH_SAMPLER_SOBOL && vshi_dot(point->mirror, point->mirror) == 0.0 &&
            vshi_sampler_is_blocks(point->taken, point->next) &&
            vshi_triangles_sees(task->triangles, (double[]){o.x, o.y, o.z});
 }
@@ -494,13 +486,8 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
             continue;
         }
         const double error = standard_error(options->sampler, point->taken, point->free);
-        task->ao[i] = (float)((double)point->free / point->taken);
-        if (task->deviation != NULL) {
-            task->deviation[i] = (float)error;
-        }
-        if (task->bent != NULL) {
-            vshi_vec_to_floats(bent_of(&piece, point), task->bent + 3 * i);
-        }
+        vshi_ao_set(&task->values, i, (float)((double)point->free / point->taken), (float)error,
+                    bent_of(&piece, point));
         stats->square_error += fixed ? 0.0 : error * error;
         stats->ao_square_error += fixed ? 0.0 : error * error;
         stats->worst_error = fmax(stats->worst_error, fixed ? 0.0 : error);
@@ -643,7 +630,7 @@ static void open_tile(const vshi_ao_task *task, const vshi_texel_lattice *lattic
             shoots[k] = 1;
         } else if (share->rays[i] > 0) {
             t->texels[k].rays = share->rays[i];
-            t->texels[k].value = task->ao[i];
+            t->texels[k].value = task->values.ao[i];
             t->texels[k].spread = (float)vshi_ao_shared_spread(task->options.sampler, share->rays[i]);
             shoots[k] = 1;
         }
@@ -706,12 +693,9 @@ static void shoot_tile(const vshi_ao_task *task, tile *t, vsh_shade_stats *stats
         const point_rays *point = &piece.points[i];
         share->rays[point->index] = point->taken;
         share->level[point->index] = point->taken > 0 ? (uint8_t)spacing : VSHI_AO_KNOWN_LEVEL;
-        if (point->taken == 0) {
-            continue;
-        }
-        task->ao[point->index] = (float)((double)point->free / point->taken);
-        if (task->bent != NULL) {
-            vshi_vec_to_floats(bent_of(&piece, point), task->bent + 3 * point->index);
+        if (point->taken > 0) {
+            vshi_ao_set(&task->values, point->index, (float)((double)point->free / point->taken), NAN,
+                        bent_of(&piece, point));
         }
     }
 }
@@ -883,12 +867,11 @@ static void shade_square(const vshi_ao_task *task, const int32_t square[2], vsh_
 }
 
 void vshi_ao_shoot(const vshi_ao_task *prepared, const vsh_points *points, const float *faces,
-                   const vshi_ao_share *share, float *shot, float *open, vsh_shade_stats *stats) {
+                   const vshi_ao_share *share, const vshi_ao_values *values, vsh_shade_stats *stats) {
     vshi_ao_task task = *prepared;
     task.points = points;
     task.faces = faces;
-    task.ao = shot;
-    task.bent = open;
+    task.values = *values;
     task.share = share;
     const int32_t side = square_side(share);
     for (int32_t y = share->top; y < share->top + share->side; y += side) {

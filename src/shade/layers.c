@@ -255,27 +255,27 @@ static void occlude(const prepared *item, const vshi_ao_task *task, size_t begin
     own.outside = task->outside;
     own.points = &piece->points;
     own.faces = task->faces != NULL ? task->faces + 3 * begin : NULL;
-    own.ao = piece->value;
-    own.deviation = task->deviation != NULL ? piece->deviation : NULL;
-    own.bent = task->bent != NULL ? piece->bent : NULL;
+    own.values = (vshi_ao_values){piece->value, task->values.deviation != NULL ? piece->deviation : NULL,
+                                  task->values.bent != NULL ? piece->bent : NULL};
     vshi_ao_shade(&own, 0, count, stats);
 }
 
 void vshi_layers_ao(const vshi_layers *layers, const vshi_ao_task *task, size_t begin, size_t end,
                     vsh_shade_stats *stats) {
+    const vshi_ao_values *to = &task->values;
     layer_piece piece;
     cut(&piece, task->points, begin, end);
     for (size_t k = 0; k < layers->count; ++k) {
         occlude(&layers->items[k], task, begin, &piece, stats);
         for (size_t i = begin, n = 0; i < end; ++i, ++n) {
             combine(layers->items[k].layer.combine, (double)piece.value[n], (double)piece.deviation[n], 1.0,
-                    &task->ao[i], task->deviation != NULL ? &task->deviation[i] : NULL);
-            if (task->bent != NULL) { /* the layer hides this part of the full sky */
+                    &to->ao[i], to->deviation != NULL ? &to->deviation[i] : NULL);
+            if (to->bent != NULL) { /* the layer hides this part of the full sky */
                 const vshi_vec normal = vshi_unit(vshi_vec_off(task->points->normals + 3 * i));
                 float open[3];
                 vshi_vec_to_floats(vshi_scale(normal, VSHI_AO_OPEN), open);
                 for (size_t axis = 0; axis < 3; ++axis) {
-                    task->bent[3 * i + axis] += piece.bent[3 * n + axis] - open[axis];
+                    to->bent[3 * i + axis] += piece.bent[3 * n + axis] - open[axis];
                 }
             }
         }

@@ -278,8 +278,8 @@ static void shade_piece(const void *user, size_t begin, size_t end, vsh_shade_st
         task.kernel = call->kernel;
         task.points = &points;
         task.faces = call->faces != NULL ? &p.faces[0][0] : NULL;
-        task.ao = p.values;
-        task.deviation = output->ao_error != NULL ? p.deviations : NULL;
+        task.values.ao = p.values;
+        task.values.deviation = output->ao_error != NULL ? p.deviations : NULL;
         vshi_ao_shade(&task, 0, p.count, stats);
         scatter(&p, 1, p.values, output->ao);
         scatter(&p, 1, p.deviations, output->ao_error);
