@@ -346,15 +346,7 @@ double vshi_trace_bytes(const vsh_charts *charts, int32_t threads) {
 }
 
 static void free_work(work *w) {
-    free(w->compared_texels);
-    free(w->compared);
-    free(w->level);
-    free(w->rays);
-    free(w->position);
-    free(w->irradiance);
-    free(w->vectors);
-    free(w->deviation);
-    free(w->values);
+    free(w->values); /* the block's first array */
     vshi_origins_free(&w->origins);
     vshi_samples_free(&w->samples);
 }
@@ -377,7 +369,7 @@ static vsh_result allocate_work(const tracing *t, work *w, vsh_error *error) {
         VSHI_ARRAY(w->compared_texels, compared),
         VSHI_ARRAY(w->position, t->shares ? 3 * room : 0),
     };
-    return VSHI_ALLOCATE_ALL(arrays, "lightmap tile", error);
+    return VSHI_ALLOCATE_BLOCK(arrays, "lightmap tile", error);
 }
 
 /* Whether origin `k` and the one before it share a texel. */

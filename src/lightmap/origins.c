@@ -269,18 +269,11 @@ vsh_result vshi_origins_allocate(vshi_origins *origins, size_t room, vsh_error *
         VSHI_ARRAY(origins->face, 3 * room),  VSHI_ARRAY(origins->texel, room),
         VSHI_ARRAY(origins->valid, room),     VSHI_ARRAY(origins->crease, room),
     };
-    return VSHI_ALLOCATE_ALL(arrays, "lightmap samples", error);
+    return VSHI_ALLOCATE_BLOCK(arrays, "lightmap samples", error);
 }
 
 void vshi_origins_free(vshi_origins *origins) {
-    free(origins->crease);
-    free(origins->valid);
-    free(origins->texel);
-    free(origins->face);
-    free(origins->normal);
-    free(origins->start);
-    free(origins->position);
-    free(origins->sample);
+    free(origins->sample); /* the block's first array */
     *origins = (vshi_origins){.count = 0};
 }
 

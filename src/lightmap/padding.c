@@ -5,6 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 
+static void copy_texel(const vshi_plane *planes, size_t plane_count, size_t from, size_t to) {
+    for (const vshi_plane *p = planes; p < planes + plane_count; ++p) {
+        memcpy(p->values + to * p->channels, p->values + from * p->channels, p->channels * sizeof(float));
+    }
+}
+
 /* --- around charts
  *
  * A separable nearest-neighbour search: first the nearest valid texel within each column, then over the
@@ -90,13 +96,8 @@ static void fill_rows(void *user, size_t begin, size_t end) {
                 f->filled[at] =
                     radius == 0 ? kind == VSHI_TEXEL_VALID || kind == VSHI_TEXEL_FILLED : source != SIZE_MAX;
             }
-            if (source == SIZE_MAX) {
-                continue;
-            }
-            for (size_t p = 0; p < f->plane_count; ++p) {
-                const size_t channels = f->planes[p].channels;
-                memcpy(f->planes[p].values + at * channels, f->planes[p].values + source * channels,
-                       channels * sizeof(float));
+            if (source != SIZE_MAX) {
+                copy_texel(f->planes, f->plane_count, source, at);
             }
         }
     }
@@ -259,12 +260,8 @@ void vshi_spread_copy(const vshi_spread *spread, uint8_t *state, const vshi_plan
                       size_t plane_count) {
     for (size_t i = 0; i < spread->count; ++i) {
         const size_t to = spread->texel[i], from = spread->source[i];
-        for (size_t p = 0; state[from] == VSHI_TEXEL_VALID && p < plane_count; ++p) {
-            const size_t channels = planes[p].channels;
-            memcpy(planes[p].values + to * channels, planes[p].values + from * channels,
-                   channels * sizeof(float));
-        }
         if (state[from] == VSHI_TEXEL_VALID) {
+            copy_texel(planes, plane_count, from, to);
             state[to] = VSHI_TEXEL_FILLED;
         }
     }

@@ -543,17 +543,13 @@ vsh_result vshi_samples_allocate(vshi_samples *samples, size_t room, bool tangen
         VSHI_ARRAY(samples->mesh, room),
         VSHI_ARRAY(samples->tangent, tangents ? 4 * room : 0),
     };
-    return VSHI_ALLOCATE_ALL(arrays, "texels", error);
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "texels", error));
+    samples->tangent = tangents ? samples->tangent : NULL;
+    return VSH_OK;
 }
 
 void vshi_samples_free(vshi_samples *samples) {
-    free(samples->tangent);
-    free(samples->mesh);
-    free(samples->texel);
-    free(samples->lift);
-    free(samples->geometric);
-    free(samples->normal);
-    free(samples->position);
+    free(samples->position); /* the block's first array */
     *samples = (vshi_samples){.count = 0};
 }
 

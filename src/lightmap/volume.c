@@ -15,7 +15,6 @@
 
 #include <math.h>
 #include <pthread.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,6 +25,9 @@ enum {
     REACH = 4,  /* voxels: distance from which a voxel inside a solid takes a value */
     STEPS = 256 /* places within REACH */
 };
+
+/* Shares of the progress: filling is cheap. */
+enum { SHADE_UNITS = 15, FILL_UNITS = 1 };
 
 /* A place within REACH of a voxel. */
 typedef struct fill_step {
@@ -53,7 +55,7 @@ typedef struct volume_bake {
     voxel_mask *shaded, *filled;       /* [block_count] */
     fill_step steps[STEPS];            /* the nearest first */
     int first_step[REACH * REACH + 1]; /* the first step with at least this squared length */
-    atomic_bool out_of_memory;
+    vshi_job *job;
     pthread_mutex_t lock; /* of the statistics */
     vsh_shade_stats stats;
 } volume_bake;
@@ -265,18 +267,19 @@ typedef struct facts {
     bool open;     /* AO is 1 */
 } facts;
 
-/* Gives a channel of a block one value. False if memory is short. */
-static bool set_all(volume_bake *bake, size_t channel, size_t block, float value) {
+/* Gives a channel of a block one value. Errors: VSH_ERROR_MEMORY. */
+static vsh_result set_all(const volume_bake *bake, size_t channel, size_t block, float value,
+                          vsh_error *error) {
     const uint64_t *mask = bake->blocks[block].mask;
     if (count_bits(mask) == VSHI_BLOCK_VOXELS) {
         vshi_volume_set_tile(bake->volume, channel, block, value);
-        return true;
+        return VSH_OK;
     }
     float *leaf = vshi_volume_values(bake->volume, channel, block);
     for (size_t v = 0; leaf != NULL && v < VSHI_BLOCK_VOXELS; ++v) {
         leaf[v] = is_set(mask, v) ? value : leaf[v];
     }
-    return leaf != NULL;
+    return leaf != NULL ? VSH_OK : vshi_fail_memory(error, "volume");
 }
 
 /* Sets the light of a channel, and whether it holds errors. Channels are the shadows of lights, AO, then
@@ -300,8 +303,9 @@ static bool is_known(const volume_bake *bake, const facts *known, size_t channel
     return known->open;
 }
 
-/* Shades the unknown channels, and sets the known ones. False if memory is short. */
-static bool shade_piece(volume_bake *bake, piece *p, const facts *known, vsh_shade_stats *stats) {
+/* Shades the unknown channels, and sets the known ones. Errors: VSH_ERROR_MEMORY. */
+static vsh_result shade_piece(const volume_bake *bake, piece *p, const facts *known, vsh_shade_stats *stats,
+                              vsh_error *error) {
     bool asked = false;
     for (size_t c = 0; c < bake->channel_count; ++c) {
         float value;
@@ -309,12 +313,12 @@ static bool shade_piece(volume_bake *bake, piece *p, const facts *known, vsh_sha
         if (!is_known(bake, known, c, &value)) {
             p->to[c] = p->values + c * VSHI_BLOCK_VOXELS;
             asked = true;
-        } else if (!set_all(bake, c, p->block, value)) {
-            return false;
+        } else {
+            VSHI_TRY(set_all(bake, c, p->block, value, error));
         }
     }
     if (!asked) {
-        return true;
+        return VSH_OK;
     }
     number_voxels(bake, p);
     const bool ao = bake->options.ao != 0;
@@ -324,26 +328,24 @@ static bool shade_piece(volume_bake *bake, piece *p, const facts *known, vsh_sha
     output.shadow_error = bake->shadow_error ? p->to + bake->light_count + ao : NULL;
     output.ao = ao ? p->to[bake->light_count] : NULL;
     output.ao_error = bake->ao_error ? p->to[bake->channel_count - 1] : NULL;
-    /* the caller gives none of this, so only memory can fail */
-    if (vsh_query_points(bake->query, &points, NULL, &bake->one, &output, stats, NULL) != VSH_OK) {
-        return false;
-    }
+    VSHI_TRY(vsh_query_points(bake->query, &points, NULL, &bake->one, &output, stats, error));
     for (size_t c = 0; c < bake->channel_count; ++c) {
         float *leaf = p->to[c] != NULL ? vshi_volume_values(bake->volume, c, p->block) : NULL;
         for (size_t i = 0; leaf != NULL && i < p->count; ++i) {
             leaf[p->voxel[i]] = p->to[c][i];
         }
         if (p->to[c] != NULL && leaf == NULL) {
-            return false;
+            return vshi_fail_memory(error, "volume");
         }
     }
-    return true;
+    return VSH_OK;
 }
 
-static bool shade_block(volume_bake *bake, piece *p, const facts *known, vsh_shade_stats *stats) {
+static vsh_result shade_block(const volume_bake *bake, piece *p, const facts *known, vsh_shade_stats *stats,
+                              vsh_error *error) {
     uint64_t *shaded = bake->shaded[p->block];
     if (known->inside) {
-        return true;
+        return VSH_OK;
     }
     list_voxels(bake, p);
     if (!known->outside) {
@@ -355,13 +357,13 @@ static bool shade_block(volume_bake *bake, piece *p, const facts *known, vsh_sha
     for (size_t i = 0; i < p->count; ++i) {
         set_voxel(shaded, p->voxel[i]);
     }
-    if (p->count > 0 && !shade_piece(bake, p, known, stats)) {
-        return false;
+    if (p->count > 0) {
+        VSHI_TRY(shade_piece(bake, p, known, stats, error));
     }
     if (memcmp(shaded, bake->blocks[p->block].mask, sizeof *bake->shaded) == 0) {
         vshi_volume_settle(bake->volume, p->block, shaded); /* early: uniform blocks free their memory */
     }
-    return true;
+    return VSH_OK;
 }
 
 /* A ball that holds the centres of all voxels of a block. */
@@ -409,48 +411,43 @@ static void find_facts(const volume_bake *bake, size_t begin, size_t count, fact
     }
 }
 
-static void shade_blocks(void *user, size_t begin, size_t end) {
+/* Shades GRAIN blocks. */
+static vsh_result shade_blocks(void *user, size_t number, vsh_error *error) {
     volume_bake *bake = user;
-    if (atomic_load(&bake->out_of_memory)) {
-        return;
-    }
-    const size_t lights = bake->light_count;
+    const size_t lights = bake->light_count, begin = number * GRAIN, left = bake->block_count - begin;
+    const size_t count = left < GRAIN ? left : GRAIN;
     vsh_shade_stats stats = vsh_shade_stats_zero();
     facts known[GRAIN] = {0};
+    int8_t *proofs;
     piece p;
-    p.values = malloc(bake->channel_count * VSHI_BLOCK_VOXELS * sizeof *p.values);
-    p.to = malloc(bake->channel_count * sizeof *p.to);
-    int8_t *proofs = calloc(GRAIN * lights + 1, 1);
-    bool good = p.values != NULL && p.to != NULL && proofs != NULL;
-    for (size_t i = 0; i < end - begin; ++i) {
-        known[i].light = good ? proofs + i * lights : NULL;
+    const vshi_array arrays[] = {VSHI_ARRAY(p.values, bake->channel_count * VSHI_BLOCK_VOXELS),
+                                 VSHI_ARRAY(p.to, bake->channel_count), VSHI_ARRAY(proofs, GRAIN * lights)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "volume", error));
+    for (size_t i = 0; i < count; ++i) {
+        known[i].light = proofs + i * lights;
     }
-    if (good && !bake->normals) {
-        find_facts(bake, begin, end - begin, known, &stats);
+    if (!bake->normals) {
+        find_facts(bake, begin, count, known, &stats);
     }
-    for (p.block = begin; p.block < end && good; ++p.block) {
-        good = shade_block(bake, &p, &known[p.block - begin], &stats);
+    vsh_result result = VSH_OK;
+    for (p.block = begin; p.block < begin + count && result == VSH_OK; ++p.block) {
+        result = shade_block(bake, &p, &known[p.block - begin], &stats, error);
     }
-    free(proofs);
-    free(p.to);
     free(p.values);
-    if (!good) {
-        atomic_store(&bake->out_of_memory, true);
-    }
     /* in units, so that the order of threads changes no bit */
     stats.square_error = floor(stats.square_error / VSHI_SQUARE_UNIT) * VSHI_SQUARE_UNIT;
     stats.ao_square_error = floor(stats.ao_square_error / VSHI_SQUARE_UNIT) * VSHI_SQUARE_UNIT;
     pthread_mutex_lock(&bake->lock);
     vshi_shade_stats_add(&bake->stats, &stats);
     pthread_mutex_unlock(&bake->lock);
+    vshi_job_advance(bake->job, SHADE_UNITS * count);
+    return result;
 }
 
 /* --- filling: voxels inside solids take the value of the nearest shaded voxel */
 
 /* A distance between voxels' corners may be too large by this, voxels of the finest level. */
 static const double DISTANCE_ERROR = 0.87;
-
-static const char OUT_OF_MEMORY[] = "volume: the system refused memory";
 
 static int compare_steps(const void *left, const void *right) {
     const fill_step *a = left, *b = right;
@@ -567,7 +564,7 @@ static vsh_result fill_block(void *user, size_t block, vsh_error *error) {
         for (size_t c = 0; c < bake->channel_count; ++c) {
             float *values = vshi_volume_values(bake->volume, c, block);
             if (values == NULL) {
-                return vshi_fail(error, VSH_ERROR_MEMORY, OUT_OF_MEMORY);
+                return vshi_fail_memory(error, "volume");
             }
             values[open[i]] = vshi_volume_value(bake->volume, c, from, nearest);
         }
@@ -577,9 +574,6 @@ static vsh_result fill_block(void *user, size_t block, vsh_error *error) {
 }
 
 /* --- the whole */
-
-/* Shares of the progress: filling is cheap. */
-enum { SHADE_UNITS = 15, FILL_UNITS = 1 };
 
 /* Settles the blocks that filling may have changed. */
 static void settle_blocks(void *user, size_t begin, size_t end) {
@@ -596,10 +590,10 @@ static void settle_blocks(void *user, size_t begin, size_t end) {
 }
 
 /* Fills and settles all blocks, and closes the volume. */
-static vsh_result finish(volume_bake *bake, vshi_job *job, vsh_error *error) {
+static vsh_result finish(volume_bake *bake, vsh_error *error) {
     vsh_volume_info counts = {0};
-    VSHI_TRY(vshi_parallel_each(job, bake->block_count, GRAIN, FILL_UNITS, fill_block, bake, error));
-    VSHI_TRY(vshi_parallel_for(job, bake->block_count, GRAIN, 0, settle_blocks, bake, error));
+    VSHI_TRY(vshi_parallel_each(bake->job, bake->block_count, GRAIN, FILL_UNITS, fill_block, bake, error));
+    VSHI_TRY(vshi_parallel_for(bake->job, bake->block_count, GRAIN, 0, settle_blocks, bake, error));
     for (size_t b = 0; b < bake->block_count; ++b) {
         const uint64_t shaded = count_bits(bake->shaded[b]), filled = count_bits(bake->filled[b]);
         counts.shaded += shaded;
@@ -682,24 +676,20 @@ static vsh_result begin(volume_bake *bake, const vsh_light *lights, const vsh_ru
     list_steps(bake);
     const vshi_array masks[] = {VSHI_ARRAY(bake->shaded, bake->block_count),
                                 VSHI_ARRAY(bake->filled, bake->block_count)};
-    return VSHI_ALLOCATE_ALL(masks, "volume", error);
+    return VSHI_ALLOCATE_BLOCK(masks, "volume", error);
 }
 
 static vsh_result bake_all(volume_bake *bake, const vsh_light *lights, const vsh_run *run, vsh_error *error) {
-    vshi_job *job;
+    const size_t units = (SHADE_UNITS + FILL_UNITS) * bake->block_count;
+    const size_t pieces = (bake->block_count + GRAIN - 1) / GRAIN;
     vsh_result result;
-    VSHI_TRY(
-        vshi_job_open(&job, run, "volume", (SHADE_UNITS + FILL_UNITS) * bake->block_count, "volume", error));
+    VSHI_TRY(vshi_job_open(&bake->job, run, "volume", units, "volume", error));
     VSHI_TRY_DONE(begin(bake, lights, run, error));
-    VSHI_TRY_DONE(vshi_parallel_for(job, bake->block_count, GRAIN, SHADE_UNITS, shade_blocks, bake, error));
-    if (atomic_load(&bake->out_of_memory)) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, OUT_OF_MEMORY));
-    }
-    result = finish(bake, job, error);
+    VSHI_TRY_DONE(vshi_parallel_each(bake->job, pieces, 1, 0, shade_blocks, bake, error));
+    result = finish(bake, error);
 done:
-    free(bake->filled);
-    free(bake->shaded);
-    vshi_job_end(job);
+    free(bake->shaded); /* the block's first array */
+    vshi_job_end(bake->job);
     return result;
 }
 

@@ -472,11 +472,8 @@ static vsh_result trace_casters(const selection *of, const vsh_run *run, vshi_tr
     }
     if (solids != NULL) {
         *solids = made;
-        made = NULL;
-    } else if (*triangles != NULL) {
-        vshi_triangles_own_solids(*triangles);
-        made = NULL;
     }
+    made = NULL; /* the triangles' or the caller's now */
 done:
     vshi_solids_free(made);
     while (t.surface_count > 0) {

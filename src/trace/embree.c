@@ -622,7 +622,7 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
     return VSH_OK;
 }
 
-vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vshi_solids *solids,
+vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi_solids *solids,
                                  const vsh_run *run, vshi_triangles **triangles, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(triangles);
@@ -658,6 +658,9 @@ done:
     vshi_job_end(job);
     vshi_mesh_set_free(&set);
     if (result != VSH_OK) {
+        if (made != NULL) {
+            made->solids = NULL; /* the caller's */
+        }
         vshi_triangles_free(made);
         made = NULL;
     }
@@ -665,17 +668,11 @@ done:
     return result;
 }
 
-void vshi_triangles_own_solids(vshi_triangles *triangles) {
-    triangles->owns_solids = true;
-}
-
 void vshi_triangles_free(vshi_triangles *triangles) {
     if (triangles == NULL) {
         return;
     }
-    if (triangles->owns_solids) {
-        vshi_solids_free((vshi_solids *)(uintptr_t)triangles->solids);
-    }
+    vshi_solids_free(triangles->solids);
     if (triangles->scene != NULL) {
         triangles->embree->rtcReleaseScene(triangles->scene);
     }

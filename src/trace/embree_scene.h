@@ -90,9 +90,8 @@ struct vshi_triangles {
     vshi_sieve *sieves; /* [sieve_count], of the geometries; NULL: none lets rays through */
     size_t sieve_count, texture_count, sieve_bytes;
     vshi_texture *textures;
-    const vshi_solids *solids; /* the geometry after the meshes; may be NULL */
-    bool owns_solids;
-    uint64_t limit; /* bytes that Embree may hold; 0: no limit */
+    vshi_solids *solids; /* the geometry after the meshes; may be NULL */
+    uint64_t limit;      /* bytes that Embree may hold; 0: no limit */
     atomic_llong bytes;
     atomic_bool refused;
 };

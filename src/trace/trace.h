@@ -51,12 +51,12 @@ vshi_cone_state vshi_solids_cone(const vshi_solids *solids, const double origin[
 /* The triangles of some meshes in world space, in a tree for rays. Immutable; may be shared by threads. */
 typedef struct vshi_triangles vshi_triangles;
 
-/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. Rays meet the procedural
- * solids beside them as they are: these may be NULL, and must outlive the result. The first call loads
- * Embree, which stays loaded. Errors: VSH_ERROR_UNSUPPORTED (Embree cannot be loaded), VSH_ERROR_INPUT (as
- * vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
+/* Copies the meshes' triangles, transforms applied; both sides of a triangle block. `solids`, which may be
+ * NULL, are part of the scene. The result owns them, but not after an error. The first call
+ * loads Embree, which stays loaded. Errors: VSH_ERROR_UNSUPPORTED (Embree cannot be loaded), VSH_ERROR_INPUT
+ * (as vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
  * vshi_triangles_free(). */
-vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, const vshi_solids *solids,
+vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi_solids *solids,
                                  const vsh_run *run, vshi_triangles **triangles, vsh_error *error);
 void vshi_triangles_free(vshi_triangles *triangles); /* NULL does nothing */
 
@@ -77,9 +77,6 @@ typedef struct vshi_quads {
  * vshi_triangles_create(), and of `write`. */
 vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, double held, vshi_job *job,
                                    vshi_triangles **triangles, vsh_error *error);
-
-/* Makes the triangles free their solids with themselves. */
-void vshi_triangles_own_solids(vshi_triangles *triangles);
 
 /* Whether each of `count` rays meets a triangle. Thread safe. */
 void vshi_triangles_blocked(const vshi_triangles *triangles, const vshi_segment_ray *rays, size_t count,
