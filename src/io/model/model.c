@@ -322,23 +322,6 @@ void vshi_model_check_normals(const char *path, const vsh_run *run, const char *
 static const char alembic[] = "an Alembic file", usd[] = "a USD file";
 static const char blender[] = "Blender's own file; export it as GLB (File, Export, glTF 2.0)";
 
-vsh_result vshi_unsupported_check(const char *path, vsh_error *error) {
-    static const struct {
-        const char *ending, *what;
-    } formats[] = {{"abc", alembic}, {"usd", usd},  {"usda", usd},
-                   {"usdc", usd},    {"usdz", usd}, {"blend", blender}};
-    const char *ending = vshi_path_ending(path);
-    for (size_t i = 0; i < sizeof formats / sizeof formats[0]; ++i) {
-        if (strcasecmp(ending, formats[i].ending) == 0) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: is %s, which is not read: " VSHI_FORMATS, path,
-                             formats[i].what);
-        }
-    }
-    return VSH_OK;
-}
-
-enum { READ_UNITS = 750, REST_UNITS = 250 };
-
 /* Formats that are read. tests/models tests each with files of Blender. Assimp reads more formats, but some
  * wrongly. */
 static const struct {
@@ -347,6 +330,27 @@ static const struct {
 } formats[] = {{"obj", vshi_obj_read},   {"gltf", vshi_gltf_read},  {"glb", vshi_gltf_read},
                {"ply", vshi_ply_read},   {"stl", vshi_assimp_read}, {"fbx", vshi_assimp_read},
                {"dae", vshi_assimp_read}};
+
+/* The advice of errors about other formats. */
+#define FORMATS                                                                                              \
+    "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
+
+vsh_result vshi_unsupported_check(const char *path, vsh_error *error) {
+    static const struct {
+        const char *ending, *what;
+    } others[] = {{"abc", alembic}, {"usd", usd},  {"usda", usd},
+                  {"usdc", usd},    {"usdz", usd}, {"blend", blender}};
+    const char *ending = vshi_path_ending(path);
+    for (size_t i = 0; i < sizeof others / sizeof others[0]; ++i) {
+        if (strcasecmp(ending, others[i].ending) == 0) {
+            return vshi_fail(error, VSH_ERROR_INPUT, "%s: is %s, which is not read: " FORMATS, path,
+                             others[i].what);
+        }
+    }
+    return VSH_OK;
+}
+
+enum { READ_UNITS = 750, REST_UNITS = 250 };
 
 typedef struct reading {
     const char *path;
@@ -374,8 +378,8 @@ static vsh_result read_file(const reading *r, vsh_error *error) {
                        : vshi_fail(error, VSH_ERROR_INPUT, "%s: holds no triangles", r->path);
         }
     }
-    return vshi_fail(error, VSH_ERROR_INPUT, "%s: '.%s' is no mesh format that is read: " VSHI_FORMATS,
-                     r->path, ending);
+    return vshi_fail(error, VSH_ERROR_INPUT, "%s: '.%s' is no mesh format that is read: " FORMATS, r->path,
+                     ending);
 }
 
 static vsh_result read_in_reader(const reading *r, vsh_error *error);

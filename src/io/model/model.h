@@ -224,10 +224,6 @@ vshi_read_model_fn vshi_obj_read, vshi_ply_read, vshi_gltf_read, vshi_assimp_rea
 
 /* --- formats that are not read */
 
-/* The advice of errors about other formats. */
-#define VSHI_FORMATS                                                                                         \
-    "give a mesh as OBJ, glTF, GLB, PLY, STL, FBX or DAE, a level set as .vdb, or a scene as .json"
-
 /* Fails with VSH_ERROR_INPUT, naming the formats that are read, for endings of Blender, Alembic or USD. */
 vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 
