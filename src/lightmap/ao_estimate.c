@@ -9,6 +9,18 @@
 
 /* --- shots */
 
+/* The plane of a texel's window (slopes for each texel of the page), and its error. */
+typedef struct ao_plane {
+    float slope[2], deviation, curved;
+} ao_plane;
+
+double vshi_shots_bytes(const vsh_lightmap *planes, bool ao, bool sky) {
+    const double shots = sizeof(float) + sizeof(int32_t) + 1.0, place = 6.0 * sizeof(float);
+    const double estimate = sizeof(ao_plane) + sizeof(float);
+    const double bent = ao && planes->bent != NULL ? 10.0 * sizeof(float) : 0.0; /* and tangents */
+    return (ao || sky ? place + estimate : 0.0) + (ao ? shots : 0.0) + (sky ? shots : 0.0) + bent;
+}
+
 void vshi_shots_list(vshi_shots *shots, vshi_array arrays[VSHI_SHOT_ARRAYS]) {
     const vshi_array list[VSHI_SHOT_ARRAYS] = {
         {(void **)&shots->own.ao, 1, sizeof(float)},
@@ -19,13 +31,14 @@ void vshi_shots_list(vshi_shots *shots, vshi_array arrays[VSHI_SHOT_ARRAYS]) {
     memcpy(arrays, list, sizeof list);
 }
 
-vsh_result vshi_shots_open(vshi_page *page, vshi_shots *shots, bool bent, vsh_error *error) {
+vsh_result vshi_shots_open(vshi_page *page, vshi_shots *shots, vsh_error *error) {
+    const bool bent = shots == &page->ao && page->lightmap.bent != NULL;
     vshi_array arrays[VSHI_SHOT_ARRAYS + 1];
     vshi_shots_list(shots, arrays);
     for (size_t i = 0; i < VSHI_SHOT_ARRAYS; ++i) {
-        arrays[i].count = vshi_page_texels(page);
+        const bool wanted = bent || arrays[i].memory != (void **)&shots->own.bent;
+        arrays[i].count = wanted ? vshi_page_texels(page) : 0;
     }
-    arrays[VSHI_SHOT_ARRAYS - 1].count *= bent;
     arrays[VSHI_SHOT_ARRAYS] =
         (vshi_array)VSHI_ARRAY(shots->compared, vshi_charts_tiles(&page->charts->sorted));
     return vshi_page_take(page, arrays, VSHI_SHOT_ARRAYS + 1, "AO texels", error);
@@ -67,12 +80,6 @@ typedef struct row_sum {
     double worst;
     uint64_t rays, refined, invalid;
 } row_sum;
-
-/* The plane of a texel's window (slopes for each texel of the page), and its error. */
-typedef struct ao_plane {
-    float slope[2], deviation, curved;
-} ao_plane;
-_Static_assert(sizeof(ao_plane) + sizeof(float) == VSHI_ESTIMATE_BYTES, "a plane and a value");
 
 typedef struct estimating {
     vshi_texel_map map;

@@ -280,12 +280,7 @@ static void find_bounds(vsh_charts *charts) {
     for (size_t m = 0; m < charts->sorted.mesh_count; ++m) {
         const vsh_mesh *mesh = &charts->sorted.meshes[m];
         for (size_t v = 0; v < mesh->vertex_count; ++v) {
-            const vshi_vec p = vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * v));
-            const double at[3] = {p.x, p.y, p.z};
-            for (int k = 0; k < 3; ++k) {
-                low[k] = fmin(low[k], at[k]);
-                high[k] = fmax(high[k], at[k]);
-            }
+            vshi_grow_box(low, high, vshi_mesh_place(mesh, v));
         }
     }
     for (int k = 0; k < 3 && low[0] <= high[0]; ++k) {

@@ -92,7 +92,8 @@ size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *s
     return count;
 }
 
-int32_t vshi_field_error_rays(double max_error) {
+/* The most rays behind each of a sample's two values. */
+static int32_t count_rays(double max_error) {
     return max_error <= FINE ? FINE_RAYS : RAYS;
 }
 
@@ -108,7 +109,7 @@ vsh_result vshi_truth_channel_open(const vshi_field_error *of, const vsh_light *
     truth->place = channel->lifter.place;
     truth->distance = options->ao_distance;
     truth->up = vshi_dot(channel->up, channel->up) > 0.0 ? &channel->up : NULL;
-    truth->rays = one_ray ? 1 : vshi_field_error_rays(options->max_error);
+    truth->rays = one_ray ? 1 : count_rays(options->max_error);
     truth->sampler = channel->sampler = vshi_sampler_create(VSH_SAMPLER_SOBOL, truth->rays, 0);
     return channel->sampler != NULL
                ? VSH_OK
@@ -184,7 +185,7 @@ void vshi_field_error_settle(const vshi_compared_texel *texel, double max_error,
     const int32_t free[2] = {texel->free[0], texel->free[1]};
     double seen[2];
     if (!isnan(value)) {
-        vshi_truth_settle(vshi_field_error_rays(max_error), free, texel->even, (double)value, seen);
+        vshi_truth_settle(count_rays(max_error), free, texel->even, (double)value, seen);
         add(texel->weight, ((double)value - seen[0]) * ((double)value - seen[1]), sum);
     }
 }

@@ -52,9 +52,9 @@ vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap
     };
     VSHI_TRY(vshi_page_take(page, arrays, sizeof arrays / sizeof *arrays, "lightmap", error));
     if (ao) {
-        VSHI_TRY(vshi_shots_open(page, &page->ao, lightmap->bent != NULL, error));
+        VSHI_TRY(vshi_shots_open(page, &page->ao, error));
     }
-    return sky ? vshi_shots_open(page, &page->sky, false, error) : VSH_OK;
+    return sky ? vshi_shots_open(page, &page->sky, error) : VSH_OK;
 }
 
 double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes, size_t light_count,
@@ -68,10 +68,7 @@ double vshi_lightmap_bytes(const vsh_charts *charts, const vsh_lightmap *planes,
         }
     }
     const bool ao = shared && (need & VSHI_NEEDS_AO) != 0, sky = shared && (need & VSHI_NEEDS_OPEN) != 0;
-    const double shots = sizeof(float) + sizeof(int32_t) + 1.0, place = 6.0 * sizeof(float);
-    double own = 1.0 + sizeof(uint32_t);
-    own += (ao || sky ? place + VSHI_ESTIMATE_BYTES : 0.0) + (ao ? shots : 0.0) + (sky ? shots : 0.0);
-    own += ao && planes->bent != NULL ? 10.0 * sizeof(float) : 0.0;
+    const double own = 1.0 + sizeof(uint32_t) + vshi_shots_bytes(planes, ao, sky);
     const double filling =
         2.0 + 1.0 + sizeof(uint32_t) + 17.0 / 3.0; /* padding, invalid texels, mip levels */
     const double texels = (double)charts->info.width * (double)charts->info.height;

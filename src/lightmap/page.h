@@ -204,8 +204,11 @@ vsh_result vshi_trace_tiles(const vshi_tracer *tracer, vshi_page *page, const ui
 
 /* --- AO of texels that share rays: their shots, the estimate, and values in planes (ao_estimate.c) */
 
-/* Allocates shots of a page. `bent`: with bent normals. Errors: as vshi_store_take(). */
-vsh_result vshi_shots_open(vshi_page *page, vshi_shots *shots, bool bent, vsh_error *error);
+/* Bytes of a texel for shots of AO, of the sky, and for their estimate. */
+double vshi_shots_bytes(const vsh_lightmap *planes, bool ao, bool sky);
+
+/* Allocates page->ao or page->sky. Errors: as vshi_store_take(). */
+vsh_result vshi_shots_open(vshi_page *page, vshi_shots *shots, vsh_error *error);
 void vshi_shots_close(vshi_page *page, vshi_shots *shots);
 
 /* Lists the arrays of shots by texel, with the bytes of a texel; those not wanted are NULL. */
@@ -215,9 +218,6 @@ void vshi_shots_list(vshi_shots *shots, vshi_array arrays[VSHI_SHOT_ARRAYS]);
 /* Stores what origin `k` of a tile shot, and its level. */
 void vshi_shots_keep(const vshi_shots *shots, size_t place, size_t k, const vshi_ao_share *share,
                      const vshi_ao_values *values);
-
-/* Bytes of a texel while shots are estimated, beside its shots and its place. */
-enum { VSHI_ESTIMATE_BYTES = 5 * sizeof(float) };
 
 /* Estimates all texels with a level, and sets their planes. `index` is the channel's in stats->errors.
  * Errors: as vshi_store_take(); VSH_ERROR_CANCELLED. */
@@ -286,6 +286,3 @@ size_t vshi_field_error_count(const vshi_truth_channel *channel, const vshi_samp
 /* Adds the error of a texel, once its value is known. */
 void vshi_field_error_settle(const vshi_compared_texel *texel, double max_error, float value,
                              vsh_bake_error *sum);
-
-/* The most rays behind each of a sample's two values. */
-int32_t vshi_field_error_rays(double max_error);

@@ -682,7 +682,7 @@ static size_t list_channels(const vsh_lightmap *lightmap, size_t light_count, ch
 static vsh_result make_channels(stitching *s, size_t light_count, vsh_error *error) {
     const vshi_array arrays[] = {VSHI_ARRAY(s->channels, s->channel_count),
                                  VSHI_ARRAY(s->values, s->channel_count * s->page_count)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "seams", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "seams", error));
     for (size_t c = 0; c < s->channel_count; ++c) {
         s->channels[c].values = s->values + c * s->page_count;
     }
@@ -697,7 +697,7 @@ static vsh_result make_pages(const stitching *s, vshi_seam_pages *pages, vsh_err
     pages->count = count;
     const vshi_array arrays[] = {VSHI_ARRAY(pages->charts, count), VSHI_ARRAY(pages->first, count + 1),
                                  VSHI_ARRAY(pages->texel, count + 1)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "seams", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "seams", error));
     for (size_t page = 0; page < count; ++page) {
         const vshi_charts *charts = &s->pages[page].charts->sorted;
         pages->charts[page] = charts;
@@ -740,8 +740,7 @@ static vsh_result stitch(stitching *s, size_t light_count, const vsh_run *run, v
 done:
     free(s->islands);
     free(s->vectors);
-    free(s->values);
-    free(s->channels);
+    free(s->channels); /* the block's first array */
     free_making(&m);
     free(system->first_row);
     free(system->first_unknown);
@@ -750,9 +749,7 @@ done:
     free(system->page);
     free(system->texel);
     vshi_seams_free(&seams);
-    free(pages.texel);
-    free(pages.first);
-    free(pages.charts);
+    free(pages.charts); /* the block's first array */
     return result;
 }
 

@@ -45,10 +45,6 @@ typedef struct edge_end {
     double x, y; /* texels */
 } edge_end;
 
-static vshi_vec place_of_vertex(const vsh_mesh *mesh, uint32_t vertex) {
-    return vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * (size_t)vertex));
-}
-
 static bool is_same_place(vshi_vec a, vshi_vec b) {
     return a.x == b.x && a.y == b.y && a.z == b.z;
 }
@@ -81,7 +77,7 @@ static void find_ends(const vshi_seam_pages *pages, uint32_t edge, edge_end ends
                              .page = (uint32_t)page,
                              .vertex = {corner[edge % 3], corner[(edge % 3 + 1) % 3]},
                              .t = k,
-                             .at = place_of_vertex(mesh, vertex),
+                             .at = vshi_mesh_place(mesh, vertex),
                              .x = (double)uv[0] * raster->width,
                              .y = (1.0 - (double)uv[1]) * raster->height};
     }
@@ -200,7 +196,7 @@ static void places_of(const finding *f, uint32_t edge, vshi_vec at[2]) {
     size_t local;
     const vsh_mesh *mesh = mesh_of_edge(f->search->pages, edge, &local);
     for (uint32_t k = 0; k < 2; ++k) {
-        at[k] = place_of_vertex(mesh, mesh->indices[3 * local + (edge % 3 + k) % 3]);
+        at[k] = vshi_mesh_place(mesh, mesh->indices[3 * local + (edge % 3 + k) % 3]);
     }
 }
 
@@ -232,18 +228,19 @@ static vsh_result list_edges(finding *f, vsh_error *error) {
 }
 
 static vsh_result list_ends(finding *f, vsh_error *error) {
-    vshi_vec low = {INFINITY, INFINITY, INFINITY}, high = {-INFINITY, -INFINITY, -INFINITY};
+    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
+    double largest = 0.0;
     for (size_t i = 0; i < f->count; ++i) {
         vshi_vec at[2];
         places_of(f, f->edges[i], at);
-        for (int k = 0; k < 2; ++k) {
-            low = (vshi_vec){fmin(low.x, at[k].x), fmin(low.y, at[k].y), fmin(low.z, at[k].z)};
-            high = (vshi_vec){fmax(high.x, at[k].x), fmax(high.y, at[k].y), fmax(high.z, at[k].z)};
-        }
+        vshi_grow_box(low, high, at[0]);
+        vshi_grow_box(low, high, at[1]);
     }
-    f->centre = vshi_scale(vshi_add(low, high), 0.5);
-    const double largest = fmax(fmax(fmax(-low.x, high.x), fmax(-low.y, high.y)), fmax(-low.z, high.z));
-    f->within = ON_EDGE * fmax(largest, 0.0);
+    for (int k = 0; k < 3; ++k) {
+        largest = fmax(largest, fmax(-low[k], high[k]));
+    }
+    f->centre = vshi_scale(vshi_add(vshi_vec_of(low), vshi_vec_of(high)), 0.5);
+    f->within = ON_EDGE * largest;
     f->ends.count = 2 * f->count;
     VSHI_TRY(vshi_allocate((void **)&f->ends.list, f->ends.count, sizeof *f->ends.list, what, error));
     for (size_t i = 0; i < f->count; ++i) {
@@ -428,7 +425,7 @@ static void place_mesh(seam_search *s, const vshi_charts *charts, size_t m, uint
                        uint32_t vertex, welded *w) {
     const vsh_mesh *mesh = &charts->meshes[m];
     for (uint32_t v = 0; v < mesh->vertex_count; ++v) {
-        const vshi_vec at = place_of_vertex(mesh, v);
+        const vshi_vec at = vshi_mesh_place(mesh, v);
         w->places[vertex + v] = (vshi_vec){at.x + 0.0, at.y + 0.0, at.z + 0.0}; /* -0 is 0 */
     }
     for (size_t i = 0; i < mesh->triangle_count; ++i, ++triangle) {
