@@ -1,5 +1,5 @@
 /* Ambient occlusion by every method, against closed forms and ray-traced truth. test_claims.c has the error
- * that `exact` keeps, test_receivers.c points that are none. */
+ * that `exact` keeps, test_ranges.c bad options. */
 #include "traced.h"
 #include "truth/directions.h"
 #include "truth/metrics.h"
@@ -92,50 +92,7 @@ TEST(an_open_plate_is_exactly_1) {
     }
 }
 
-TEST(options_out_of_range_are_named_and_no_points_need_no_normals) {
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.2, 1.0);
-    const double p[3] = {0.0, 0.001, 2.0};
-    const struct {
-        int32_t cones;
-        double distance;
-        int32_t method;
-        const char *part;
-    } cases[] = {{0, 1.0, VSH_AO_CONES, "ao_cones"},         {-1, 1.0, VSH_AO_CONES, "ao_cones"},
-                 {257, 1.0, VSH_AO_CONES, "ao_cones"},       {1, 0.0, VSH_AO_CONES, "ao_distance"},
-                 {1, -1.0, VSH_AO_CONES, "ao_distance"},     {1, NAN, VSH_AO_CONES, "ao_distance"},
-                 {1, INFINITY, VSH_AO_CONES, "ao_distance"}, {1, 1.0, VSH_AO_AUTO + 1, "ao_method"},
-                 {1, 1.0, VSH_AO_EXACT, "triangles"}};
-    float ao = -1.0f, bent[3];
-    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
-        vsh_shade_options options = options_of(cases[i].method, 64, cases[i].distance);
-        options.ao_cones = cases[i].cones;
-        const vsh_points points = {1, p, UP, NULL};
-        assert_fails(
-            vsh_shade_ao(occluders_of(field), &points, &options, NULL, &ao, NULL, NULL, NULL, &failure),
-            VSH_ERROR_ARGUMENT, cases[i].part);
-    }
-    for (int i = 0; i < 4; ++i) {
-        const vsh_points bare = {i / 2, i < 2 ? NULL : p, NULL, NULL};
-        float *const direction = i % 2 ? bent : NULL;
-        assert_fails(
-            vsh_shade_ao(occluders_of(field), &bare, NULL, NULL, &ao, NULL, direction, NULL, &failure),
-            i < 2 ? VSH_OK : VSH_ERROR_ARGUMENT, "normals");
-    }
-    assert_true(ao == -1.0f);
-}
-
 /* --- cones and taps */
-
-TEST(a_wall_hides_half_of_the_sky_from_its_foot) {
-    const truth_solid solids[] = {{TRUTH_BOX, {0.0, -0.5, 0.0}, {3.0, 0.5, 3.0}, 0.0, 0.0},
-                                  {TRUTH_BOX, {-1.0, 1.0, 0.0}, {1.0, 2.0, 3.0}, 0.0, 0.0}};
-    OWNED(vsh_field) *field = field_of((truth_scene){solids, 2}, 0.02, 0.0);
-    for (double away = 0.01; away < 0.05; away += 0.01) {
-        for (int32_t cones = 8; cones <= 64; cones *= 2) {
-            assert_near(ao_at(field, cones, 1.0, (const double[]){away, 0.001, 0.1}), 0.5, 0.06);
-        }
-    }
-}
 
 /* Over points around a sphere that rests on a plate, or hovers over it; nearer to the foot of the resting one
  * the cleft is lower than a voxel. */
@@ -212,22 +169,6 @@ TEST(on_the_seeds_floor_cones_are_near_the_truth) {
         const truth_metrics m = compare_seeds(ao);
         assert_true(m.rmse < bounds[n][0] && fabs(m.bias) < bounds[n][1]);
     }
-}
-
-TEST(farther_distances_hide_more) {
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.04, 0.0);
-    uint64_t counter = 3;
-    double rise = 0.0;
-    for (int i = 0; i < 200; ++i) {
-        const double p[3] = {between(&counter, -2.5, 2.5), 0.001, between(&counter, -2.5, 2.5)};
-        double last = 1.0;
-        for (double distance = 0.1; distance < 10.0; distance *= 1.3) {
-            const double ao = ao_at(field, 16, distance, p);
-            rise = fmax(rise, ao - last);
-            last = ao;
-        }
-    }
-    assert_at_most(rise, 3e-3); /* samples of a longer cone fall elsewhere */
 }
 
 /* --- rays */
@@ -312,7 +253,7 @@ TEST(edges_hide_as_much_as_their_casters) {
 
 /* Against many rays on the same field: the true error is at most the reported one, which is at most the one
  * asked for. */
-TEST(adaptive_keeps_the_error_asked_for_and_reports_it) {
+TEST(adaptive_keeps_the_requested_error_and_reports_it) {
     static const double errors[] = {0.05, 0.02, 0.01};
     static float truth[TEXELS], ao[TEXELS], deviation[TEXELS];
     const vsh_shade_options many = options_of(VSH_AO_RAYS, 4096, 1.0);

@@ -200,13 +200,8 @@ static vsh_result bake(const vsh_field *field, const asked *ask, baked *into) {
 }
 
 static double degrees_between(const float *a, const double b[3]) {
-    double dot = 0.0, aa = 0.0, bb = 0.0;
-    for (int k = 0; k < 3; ++k) {
-        dot += (double)a[k] * b[k];
-        aa += (double)(a[k] * a[k]);
-        bb += b[k] * b[k];
-    }
-    return acos(fmin(1.0, dot / sqrt(aa * bb))) * 180.0 / PI;
+    const double v[3] = {a[0], a[1], a[2]};
+    return acos(fmin(1.0, dot3(v, b) / (length3(v) * length3(b)))) / RADIANS(1.0);
 }
 
 static const int32_t METHODS[] = {VSH_AO_CONES, VSH_AO_RAYS, VSH_AO_ADAPTIVE};
@@ -302,7 +297,7 @@ TEST(a_wall_in_a_layer_bends_as_one_in_the_field) {
 TEST(tints_and_ambient_light_follow_their_formulas) {
     OWNED(vsh_field) *field = floor_field(true);
     FREED baked *plain = malloc(sizeof *plain), *b = malloc(sizeof *b);
-    const double ambient[3] = {0.25, 0.5, 1.0};
+    const double ambient[3] = {0.25, 0.5, 1.0}, cosine = 6.0 / length3((double[]){-1.0, 6.0, 0.2});
     asked ask = {.ao_method = VSH_AO_CONES, .light = true};
     assert_ok(bake(field, &ask, plain));
     ask.tint.type = VSH_TINT_QUADRATIC;
@@ -313,14 +308,13 @@ TEST(tints_and_ambient_light_follow_their_formulas) {
         const double v = (double)plain->shadow[i], open = (double)plain->ao[i];
         const double tinted[3] = {v, 0.5 * v * v + 0.5 * v, v * v};
         assert_int_equal(bits_of(b->shadow[i]), bits_of(plain->shadow[i]));
-        /* without ambient light AO darkens the light of the sun, whose blue is as its red; with it only the
-         * ambient light is darkened */
-        const double direct = open > 0.0 ? (double)plain->irradiance[3 * i] / open : 0.0;
+        /* AO darkens the ambient light, or the sun's where there is none */
         grey += v > 0.1 && v < 0.9;
         for (size_t c = 0; c < 3; ++c) {
             assert_float_equal(b->tint[3 * i + c], tinted[c], 1e-6);
-            const double color = c == 1 ? 0.5 : 1.0, share = v > 0.0 ? tinted[c] / v : 0.0;
-            assert_float_equal(b->irradiance[3 * i + c], direct * color * share + ambient[c] * open, 2e-5);
+            const double direct = cosine * (c == 1 ? 0.5 : 1.0);
+            assert_float_equal(plain->irradiance[3 * i + c], direct * v * open, 2e-5);
+            assert_float_equal(b->irradiance[3 * i + c], direct * tinted[c] + ambient[c] * open, 2e-5);
         }
     }
     assert_true(grey > 30);

@@ -1,8 +1,7 @@
 /* Lightmaps of a wall that stands on a floor, of a coarse smooth sphere and of an open sheet. Padding gives
  * texels outside of charts their nearest neighbour's value. */
-#include "casts.h"
-#include "fields.h"
 #include "lightmap/padding.h"
+#include "shading.h"
 #include "testing.h"
 #include "texels_of.h"
 
@@ -25,13 +24,6 @@ static vsh_field *floor_field(int wall) {
 
 static vsh_field *field_of_mesh(const vsh_mesh *mesh, double voxel) {
     return field_of_grid(grid_from_meshes(mesh, 1, voxel), 0.0);
-}
-
-static vsh_light sun(double x, double y, double z, double angle) {
-    vsh_light light = vsh_light_default();
-    memcpy(light.direction, (double[]){x, y, z}, sizeof light.direction);
-    light.angle = angle;
-    return light;
 }
 
 /* Planes of one light, AO, irradiance and coverage. */
@@ -94,7 +86,7 @@ static void end(stage *s) {
 }
 
 TEST(a_floor_under_open_sky_is_exactly_lit) {
-    const vsh_light light = sun(0.3, 1.0, 0.2, 0.2);
+    const vsh_light light = sun((double[]){0.3, 1.0, 0.2}, 0.2);
     static const int32_t sizes[][2] = {{SIZE, 0}, {1, 4}}; /* with their padding */
     for (int k = 0; k < 2; ++k) {
         FREED_BY(end) stage s = begin_floor(0, sizes[k][0], 1, sizes[k][1]);
@@ -109,7 +101,7 @@ TEST(a_floor_under_open_sky_is_exactly_lit) {
 }
 
 TEST(texels_under_a_wall_are_invalid_and_nothing_leaks_on_either_side) {
-    const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    const vsh_light light = sun((double[]){1.0, 1.0, 0.0}, 0.05);
     uint64_t invalid_by_mesh[1] = {77}, invalid = 0;
     FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
     s.stats.invalid_by_mesh = invalid_by_mesh;
@@ -141,7 +133,7 @@ TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
     vsh_mesh mesh = floor_mesh(NULL);
     mesh.positions = positions;
     mesh.uvs = uvs;
-    const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+    const vsh_light light = sun((double[]){1.0, 1.0, 0.0}, 0.05);
     FREED_BY(end) stage s = begin(floor_field(1), &mesh, SIZE, 1, PADDING);
     bake_stage(&s, &light);
     const planes *p = s.p;
@@ -161,7 +153,7 @@ TEST(padding_copies_dark_and_lit_texels_and_leaves_coverage) {
 
 TEST(a_texel_is_the_mean_of_its_valid_samples) {
     enum { N = 3, SMALL = 16 };
-    const vsh_light light = sun(1.0, 1.0, 0.0, 0.3);
+    const vsh_light light = sun((double[]){1.0, 1.0, 0.0}, 0.3);
     stage coarse = begin_floor(1, SMALL, N, 0), fine = begin_floor(1, SMALL * N, 1, 0);
     bake_stage(&coarse, &light);
     bake_stage(&fine, &light);
@@ -185,7 +177,7 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
     FREED_BY(free_sphere) sphere ball;
     make_sphere(&ball, 8, 1.0);
     const double towards[3] = {0.3, 0.9, 0.2};
-    const vsh_light light = sun(towards[0], towards[1], towards[2], 0.01);
+    const vsh_light light = sun(towards, 0.01);
     FREED_BY(end) stage s = begin(field_of_mesh(&ball.mesh, 0.02), &ball.mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
     assert_int_equal(s.stats.invalid_texels, 0);
@@ -202,7 +194,7 @@ TEST(a_coarse_smooth_sphere_has_no_dark_terminator_and_no_acne) {
 
 TEST(an_open_sheet_does_not_shade_itself) {
     const vsh_mesh mesh = floor_mesh(NULL);
-    const vsh_light light = sun(0.5, 0.8, 0.1, 0.1);
+    const vsh_light light = sun((double[]){0.5, 0.8, 0.1}, 0.1);
     FREED_BY(end) stage s = begin(field_of_mesh(&mesh, VOXEL), &mesh, SIZE, 1, 0);
     bake_stage(&s, &light);
     assert_all_equal(s.p->coverage, TEXELS, 1.0f);
@@ -211,28 +203,8 @@ TEST(an_open_sheet_does_not_shade_itself) {
 
 /* --- How a lightmap is baked: its planes, their errors, threads, options, limits. */
 
-TEST(irradiance_is_visibility_times_colour_times_cosine_times_ao) {
-    vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
-    light.color[0] = 2.0;
-    light.color[1] = 0.5;
-    light.color[2] = 0.0;
-    FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
-    bake_stage(&s, &light);
-    const planes *p = s.p;
-    FREED planes *alone = new_planes();
-    alone->all = (vsh_lightmap){.irradiance = alone->irradiance};
-    bake(s.field, s.charts, &light, &alone->all, NULL, 0);
-    for (size_t i = 0; i < TEXELS; ++i) {
-        const double lit = (double)p->shadow[i] * sqrt(0.5), expected = lit * (double)p->ao[i];
-        assert_true(fabs((double)p->irradiance[3 * i] - 2.0 * expected) < 1e-5);
-        assert_true(fabs((double)p->irradiance[3 * i + 1] - 0.5 * expected) < 1e-5);
-        assert_true(p->irradiance[3 * i + 2] == 0.0f);
-        assert_true(fabs((double)alone->irradiance[3 * i] - 2.0 * lit) < 1e-5);
-    }
-}
-
-TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
-    const vsh_light light = sun(1.0, 1.0, 0.0, 0.05);
+TEST(planes_that_are_not_requested_cost_nothing_and_change_nothing) {
+    const vsh_light light = sun((double[]){1.0, 1.0, 0.0}, 0.05);
     FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 2);
     bake_stage(&s, &light);
     FREED planes *some = new_planes();
@@ -249,35 +221,12 @@ TEST(planes_that_are_not_asked_for_cost_nothing_and_change_nothing) {
     assert_memory_equal(some->shadow, s.p->shadow, sizeof some->shadow);
 }
 
-TEST(bad_options_and_limits_are_reported) {
-    const struct {
-        double start_offset, surface_offset, angle;
-        uint64_t memory_limit;
-        vsh_result code;
-        const char *part;
-    } cases[] = {{NAN, 0.0, 0.05, 0, VSH_ERROR_ARGUMENT, "start_offset"},
-                 {1.0, -1.0, 0.05, 0, VSH_ERROR_ARGUMENT, ""},
-                 {1.0, 0.0, 0.05, 1000, VSH_ERROR_LIMIT, ""},
-                 {1.0, 0.0, -1.0, 0, VSH_ERROR_ARGUMENT, ""}};
-    FREED_BY(end) stage s = begin_floor(1, SIZE, 1, 0);
-    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
-        const vsh_light light = sun(1.0, 1.0, 0.0, cases[i].angle);
-        vsh_shade_options options = preview_options();
-        options.start_offset = cases[i].start_offset;
-        options.surface_offset = cases[i].surface_offset;
-        const vsh_run run = run_within(cases[i].memory_limit);
-        assert_fails(vsh_bake_lightmap(occluders_of(s.field), s.charts, &light, 1, &options, &run, &s.p->all,
-                                       NULL, &failure),
-                     cases[i].code, cases[i].part);
-    }
-}
-
 /* Bakes the floor under a wall by `method` into planes of values and errors. */
 static vsh_bake_stats bake_errors(int32_t method, float *shadow, float *shadow_error, float *ao_error) {
     OWNED(vsh_field) *field = floor_field(1);
     const vsh_mesh mesh = floor_mesh(NULL);
     OWNED(vsh_charts) *charts = charts_of(&mesh, SIZE, 2, 4);
-    const vsh_light light = sun(1.0, 1.0, 0.0, 0.5);
+    const vsh_light light = sun((double[]){1.0, 1.0, 0.0}, 0.5);
     vsh_shade_options shade = preview_options();
     shade.method = method;
     float *shadows[1] = {shadow}, *errors[1] = {shadow_error};
@@ -395,8 +344,8 @@ static void make_strips(strips *s) {
     options.shade.ao_method = VSH_AO_ADAPTIVE;
     s->charts = charts_from(s->meshes, 3, &options);
     s->field = floor_field(1);
-    s->lights[0] = sun(1.0, 1.0, 0.3, 0.3);
-    s->lights[1] = sun(-0.5, 1.0, 0.0, 0.1);
+    s->lights[0] = sun((double[]){1.0, 1.0, 0.3}, 0.3);
+    s->lights[1] = sun((double[]){-0.5, 1.0, 0.0}, 0.1);
 }
 
 static void free_strips(strips *s) {
@@ -478,12 +427,13 @@ TEST(bad_rows_are_refused_and_calls_that_fail_leave_wide_rows) {
 
 static const float HOLE = -7.0f; /* the value of unfilled texels alone */
 
-static void fill(const vsh_run *run, int32_t width, int32_t height, const uint8_t *states, int32_t padding,
-                 int32_t invalid, float *values, size_t channels) {
-    const int32_t radius[VSHI_TEXEL_KINDS] = {padding, 0, invalid};
-    const vshi_plane plane = {values, channels};
-    vshi_store store = {.run = run};
-    assert_int_equal(vshi_padding_fill(&store, run, width, height, states, radius, &plane, 1, NULL, NULL),
+/* A plane of two channels. */
+static void fill(int32_t width, int32_t height, const uint8_t *states, const int32_t radii[2],
+                 float *values) {
+    const int32_t radius[VSHI_TEXEL_KINDS] = {radii[0], 0, radii[1]};
+    const vshi_plane plane = {values, 2};
+    vshi_store store = {.run = NULL};
+    assert_int_equal(vshi_padding_fill(&store, NULL, width, height, states, radius, &plane, 1, NULL, NULL),
                      VSH_OK);
     vshi_store_close(&store);
 }
@@ -509,41 +459,25 @@ TEST(every_texel_takes_the_nearest_value_and_the_first_of_equally_near_ones) {
         const int32_t width = sizes[s][0], height = sizes[s][1];
         const size_t count = (size_t)width * (size_t)height;
         FREED uint8_t *states = malloc(count);
-        FREED float *values = malloc(count * sizeof *values);
+        FREED float *values = malloc(2 * count * sizeof *values);
         for (size_t r = 0; r < COUNT_OF(radii); ++r) {
             for (size_t i = 0; i < count; ++i) {
                 random = random * 1664525u + 1013904223u;
                 const uint32_t dice = (random >> 16) % 50;
                 states[i] = dice == 0 ? VSHI_TEXEL_VALID : dice < 10 ? VSHI_TEXEL_INVALID : VSHI_TEXEL_EMPTY;
-                values[i] = states[i] == VSHI_TEXEL_VALID ? (float)i : HOLE;
+                values[2 * i] = states[i] == VSHI_TEXEL_VALID ? (float)i : HOLE; /* dark, too */
+                values[2 * i + 1] = 2.0f * values[2 * i];
             }
-            fill(NULL, width, height, states, radii[r][0], radii[r][1], values, 1);
+            fill(width, height, states, radii[r], values);
             for (size_t i = 0; i < count; ++i) {
                 const int32_t radius = states[i] == VSHI_TEXEL_EMPTY ? radii[r][0] : radii[r][1];
                 const int64_t source = states[i] == VSHI_TEXEL_VALID ? (int64_t)i
                                        : radius > 0 ? nearest(width, height, states, (int64_t)i, radius)
                                                     : -1;
-                assert_true(values[i] == (source < 0 ? HOLE : (float)source));
+                assert_true(values[2 * i] == (source < 0 ? HOLE : (float)source));
+                assert_true(values[2 * i + 1] == 2.0f * values[2 * i]);
             }
         }
-    }
-}
-
-/* A dark texel beside a lit one keeps its value and hands it on, of all channels; the states stays. */
-TEST(dark_texels_are_no_holes_and_all_channels_are_copied) {
-    uint8_t states[16] = {0}, before[16];
-    float values[3 * 16];
-    states[5] = states[6] = VSHI_TEXEL_VALID;
-    states[8] = VSHI_TEXEL_INVALID;
-    memcpy(before, states, sizeof states);
-    for (int i = 0; i < 3 * 16; ++i) {
-        values[i] = i / 3 == 5 ? 0.0f : i / 3 == 6 ? 1.0f + (float)(i % 3) : HOLE;
-    }
-    fill(NULL, 16, 1, states, 3, 8, values, 3);
-    assert_memory_equal(states, before, sizeof states);
-    for (int i = 0; i < 3 * 16; ++i) {
-        const int texel = i / 3;
-        assert_true(values[i] == (texel < 2 || texel > 9 ? HOLE : texel <= 5 ? 0.0f : 1.0f + (float)(i % 3)));
     }
 }
 
@@ -721,7 +655,7 @@ TEST(a_lightmap_is_filled_to_its_last_corner) {
     OWNED(vsh_charts) *charts = charts_of(&mesh, SIZE, 1, VSH_PADDING_AUTO),
                       *grown = charts_of(&mesh, SIZE, 1, 16);
     OWNED(vsh_field) *field = floor_field(0);
-    const vsh_light light = sun(0.3, 1.0, 0.2, 0.14);
+    const vsh_light light = sun((double[]){0.3, 1.0, 0.2}, 0.14);
     FREED planes *all = new_planes(), *other = new_planes();
     bake(field, charts, &light, &all->all, NULL, 1);
     bake(field, grown, &light, &other->all, NULL, 1);

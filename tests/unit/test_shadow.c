@@ -85,25 +85,6 @@ TEST(open_sky_is_exactly_1_at_any_distance_and_size_of_light) {
     }
 }
 
-TEST(a_plane_is_fully_lit_while_the_whole_light_is_over_its_horizon) {
-    const truth_solid plate = {TRUTH_BOX, {0.0, -0.517, 0.0}, {4.0, 0.517, 4.0}, 0.0, 0.0};
-    OWNED(vsh_field) *field = field_of((truth_scene){&plate, 1}, 0.04, 0.0);
-    uint64_t counter = 2;
-    for (int a = 0; a < ANGLE_COUNT; ++a) {
-        const double half = RADIANS(0.5 * ANGLES[a]);
-        for (double over = RADIANS(0.1); half + over < RADIANS(90.0); over *= 1.7) {
-            double towards[3];
-            direction_at(half + over, between(&counter, 0.0, 2.0 * PI), towards);
-            const vsh_light light = sun(towards, 2.0 * half);
-            for (int sample = 0; sample < 20; ++sample) {
-                const double p[3] = {between(&counter, -4.0, 4.0), sample % 2 ? 0.0 : 1e-3,
-                                     between(&counter, -4.0, 4.0)};
-                assert_marched(field, &light, p, UP, 1.0f);
-            }
-        }
-    }
-}
-
 TEST(the_middle_of_a_wide_umbra_is_exactly_0_at_any_depth) {
     const double half = 2.0, voxel = 0.05, room = 0.1 * half;
     const truth_solid block = {TRUTH_BOX, {0.0, 0.0, 0.0}, {half, half, half}, 0.0, 0.0};
@@ -440,27 +421,4 @@ TEST(cones_wider_than_the_reach_are_counted) {
     assert_true(stats.beyond_reach > 0 && stats.beyond_reach <= stats.marches);
     stats = shadows(field, &narrow, VSH_SHADOW_CONE, COUNT, positions, normals, visible);
     assert_int_equal(stats.beyond_reach, 0);
-}
-
-TEST(bad_options_and_lights_are_refused) {
-    static float visible[COUNT];
-    floor_texels(SIDE, positions, normals);
-    OWNED(vsh_field) *field = field_of(truth_seeds(), 0.2, 1.0);
-    vsh_light light = sun(truth_seeds_sun, 0.2), inverted = sun(truth_seeds_sun, -1.0);
-    vsh_shade_options o[6];
-    const char *const parts[6] = {"method", "max_steps", "start_offset", "start_offset", "start_offset", ""};
-    o[0] = o[1] = o[2] = o[3] = o[4] = o[5] = preview_options();
-    o[0].method = VSH_SHADOW_AUTO + 1;
-    o[1].max_steps = 15;
-    o[2].start_offset = -0.1;
-    o[3].start_offset = 17.0;
-    o[4].start_offset = (double)NAN;
-    o[5].struct_size = 3;
-    for (int i = 0; i < 6; ++i) {
-        assert_fails(shade(field, &light, &o[i], NULL, visible, NULL), VSH_ERROR_ARGUMENT, parts[i]);
-    }
-    assert_fails(shade(field, &inverted, NULL, NULL, visible, NULL), VSH_ERROR_ARGUMENT, "angle");
-    const vsh_points none = {0, NULL, NULL, NULL};
-    assert_ok(vsh_shade_shadow(occluders_of(field), &none, &light, NULL, NULL, NULL, NULL, NULL, &failure));
-    assert_true(shadow_at(field, &light, VSH_SHADOW_CONE, (const double[]){0.0, 9.0, 0.0}, UP) == 1.0f);
 }

@@ -219,7 +219,7 @@ TEST(walls_beside_a_receiver_shade_it) {
     }
 }
 
-/* --- solids that touch, lie in each other or share faces, and values that are no distances */
+/* --- solids that touch, lie in each other or share faces */
 
 static casting caster_of_boxes(const double (*corners)[2][3], int count, double voxel) {
     float places[4][24];
@@ -316,66 +316,6 @@ TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
         for (int kind = 0; c > 0 && kind < KINDS; ++kind) {
             const truth_metrics m = truth_compare(ACROSS, other.v[kind], one.v[kind], NULL);
             assert_less(m.rmse, 0.01);
-        }
-    }
-}
-
-static double stretched_ball(void *user, const double p[3]) {
-    const double *factor = user;
-    return *factor * (length3(p) - 0.7);
-}
-
-TEST(distance_functions_of_other_slopes_need_their_lipschitz_number) {
-    enum { COUNT = 41 };
-    const truth_solid ball = {TRUTH_SPHERE, {0, 0, 0}, {0, 0, 0}, 0.7, 0.0};
-    const double up[3] = {0.0, 1.0, 0.0}, w = 0.1;
-    const vsh_light light = sun(up, 2.0 * atan(w));
-    float truth[COUNT], visible[COUNT], truth_open[COUNT], open[COUNT], normals[3 * COUNT];
-    double positions[3 * COUNT];
-    for (int i = 0; i < COUNT; ++i) {
-        const double p[3] = {0.03 * i, -2.0, 0.01};
-        const float n[3] = {0.0f, 1.0f, 0.0f};
-        memcpy(positions + 3 * i, p, sizeof p);
-        memcpy(normals + 3 * i, n, sizeof n);
-        truth_open[i] = (float)truth_ao((truth_scene){&ball, 1}, p, up, 3.0, 4096);
-    }
-    const double nowhere[3] = {0.0, 0.0, 0.0};
-    OWNED(vshi_triangles) *triangles = triangles_of_moved((truth_scene){&ball, 1}, 1.0, nowhere);
-    assert_int_equal(
-        truth_lights((truth_scene){&ball, 1}, COUNT, positions, NULL, up, w, (double)INFINITY, 4096, truth),
-        0);
-    double factors[] = {1.0, 2.0, 0.5, 20.0, 0.05};
-    for (int exact = 0; exact < 2; ++exact) {
-        for (int f = 0; f < 5; ++f) {
-            const vsh_distance field = {stretched_ball, &factors[f],        factors[f],
-                                        exact,          {-0.8, -0.8, -0.8}, {0.8, 0.8, 0.8}};
-            const vsh_grid_options options = with_voxel(0.04);
-            vsh_grid *grid = NULL;
-            assert_ok(vsh_grid_from_distance(&field, &options, NULL, &grid, &failure));
-            const casting made = {field_of_grid(grid, 0.0), triangles};
-            for (int32_t method = 0; method < SHADOW_METHODS; ++method) {
-                const vsh_shade_stats stats =
-                    cast_shadows(&made, &light, method, COUNT, positions, NULL, visible);
-                assert_int_equal(stats.unfinished, 0);
-                const truth_metrics m = truth_compare(COUNT, visible, truth, NULL);
-                if (method == VSH_SHADOW_CONE) {
-                    /* who says that values are distances, and they are not, is only kept from a crash */
-                    assert_true((exact && f > 0) || m.rmse < 0.015);
-                }
-                for (int i = 0; i < COUNT; ++i) {
-                    assert_true(visible[i] >= 0.0f && visible[i] <= 1.0f);
-                }
-            }
-            for (int32_t method = 0; method < AO_METHODS; ++method) {
-                cast_ao(&made, method, 3.0, COUNT, positions, normals, open);
-                const truth_metrics m = truth_compare(COUNT, open, truth_open, NULL);
-                /* cones' own bias, and the error that rays keep, twice */
-                assert_true(exact || method == VSH_AO_TAPS || m.rmse < 0.04);
-                for (int i = 0; i < COUNT; ++i) {
-                    assert_true(open[i] >= 0.0f && open[i] <= 1.0f);
-                }
-            }
-            vshi_field_free(made.field);
         }
     }
 }

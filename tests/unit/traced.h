@@ -157,6 +157,11 @@ static inline bool is_ao(int kind) {
     return kind >= SHADOW_METHODS;
 }
 
+/* Values that few rays make: they may change by a whole ray where an edge moves by a rounding. */
+static inline bool by_rays(int kind) {
+    return is_ao(kind) ? kind >= SHADOW_METHODS + VSH_AO_RAYS : kind >= VSH_SHADOW_RAYS;
+}
+
 static inline const char *name_of(int kind) {
     static char name[32];
     snprintf(name, sizeof name, "%s %s", is_ao(kind) ? "AO" : "shadow",
