@@ -104,14 +104,3 @@ TEST(distances_of_many_positions_at_once_make_the_same_level_set) {
         assert_memory_equal(values[0], values[1], sizeof values[0]);
     }
 }
-
-TEST(a_level_set_without_a_callback_is_refused) {
-    const vsh_distance field = {NULL, NULL, 1.0, 1, {-1, -1, -1}, {1, 1, 1}};
-    for (int i = 0; i < 3; ++i) { /* without a callback, a field, a place for the grid */
-        vsh_grid *grid = (vsh_grid *)&failure;
-        assert_fails(vsh_grid_from_distances(i == 1 ? NULL : &field, i == 0 ? NULL : rings, NULL, NULL,
-                                             i == 2 ? NULL : &grid, &failure),
-                     VSH_ERROR_ARGUMENT, "");
-        assert_true(i == 2 || grid == NULL);
-    }
-}

@@ -63,16 +63,9 @@ TEST(bad_files_are_refused_with_the_place) {
     } cases[] = {
         {"{\"rms\": 1}", {"1:2: rms: unknown key", "\"rmse\""}},
         {"{\"nonfinite\": 1}", {"nonfinite: unknown key", ""}},
-        {"{\"rmse\": -1}", {"1:10: rmse: -1 is out of range", "0 … "}},
-        {"{\"rmse\": \"0\"}", {"expected a number", "a string"}},
-        {"{\"ssim\": 0.5}", {"1:2: ssim: unknown key", ""}},
         {"{\"step\": 0}", {"step: 0 is out of range", "(excluded)"}},
-        {"{\"reach\": 1.5}", {"reach: 1.5", "whole"}},
-        {"{\"channels\": []}", {"channels: expected an object", "an array"}},
         {"{\"channels\": {\"ao\": {\"max\": 1, \"coverage\": 1}}}",
          {"channels.ao.coverage: is no key of a channel's tolerances", ""}},
-        {"{\"rmse\": 1,}", {"1:", ""}},
-        {"", {"1:", ""}},
     };
     vshi_tolerances *tolerances = NULL;
     for (size_t i = 0; i < sizeof cases / sizeof cases[0]; ++i) {

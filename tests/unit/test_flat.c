@@ -212,7 +212,6 @@ TEST(bad_options_and_small_limits_are_refused) {
         assert_fails(vshi_flat_bake(wall, &light, 1, &bad, NULL, &view, &failure), VSH_ERROR_ARGUMENT,       \
                      part);                                                                                  \
     } while (0)
-    REFUSED(struct_size, 0, "struct_size");
     REFUSED(struct_size, sizeof good + 8, "struct_size");
     REFUSED(width, 0, "width 0");
     REFUSED(height, 65537, "height 65537");
@@ -220,7 +219,6 @@ TEST(bad_options_and_small_limits_are_refused) {
     REFUSED(padding, -1, "padding -1");
     REFUSED(region_max[0], -2.0, "region");
     REFUSED(region_min[1], NAN, "region");
-    REFUSED(region_min[1], -INFINITY, "region");
 #undef REFUSED
     vsh_light bad = light;
     bad.radius = -1.0;
@@ -228,8 +226,6 @@ TEST(bad_options_and_small_limits_are_refused) {
     bad = flat_sun(0.0, 0.0, 0.1);
     bad.direction[2] = 1.0;
     assert_fails(vshi_flat_bake(wall, &bad, 1, &good, NULL, &view, &failure), VSH_ERROR_ARGUMENT, "plane");
-    assert_fails(vshi_flat_bake(wall, NULL, 1, &good, NULL, &view, &failure), VSH_ERROR_ARGUMENT, "lights");
-    assert_fails(vshi_flat_bake(wall, &light, 1, &good, NULL, NULL, &failure), VSH_ERROR_ARGUMENT, "map");
     const vsh_run run = run_within(5000);
     assert_fails(vshi_flat_bake(wall, &light, 1, &good, &run, &view, &failure), VSH_ERROR_LIMIT, "limit");
     OWNED(vsh_outline) *far = box(-3000.0, -3000.0, 0.0, 0.5);
@@ -304,27 +300,18 @@ TEST(every_key_lands_in_its_field) {
 #define WITH(caster) "{" REGION "," LIGHTS ",\"casters\":[" caster "]}"
 #define LIT(light) "{" REGION ",\"lights\":[" light "]}"
 
-/* An @ stands before the place that the message must tell, and is taken out of the text. */
+/* An @ stands before the place that the message must name, and is taken out of the text. test_scene.c has
+ * more faults that the same parser finds. */
 static const struct {
     const char *text, *message;
 } bad[] = {
     {"@{}", "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes scenes with receivers"},
-    {"@{" LIGHTS "}",
-     "key \"region\" is missing: a flat scene needs it; 'vdbshade bake' bakes scenes with receivers"},
     {"{" LIGHTS ",\"region\":@[0,0,0,1]}", "region: is empty: expected [left, bottom, right, top]"},
-    {"{" LIGHTS ",\"region\":@[0,0,1]}", "region: expected 4 numbers, found 3"},
-    {"{" LIGHTS ",\"region\":[0,@1e16,1,1]}", "region[1]: 1e+16 is out of range -1e+15 … 1e+15"},
-    {"{" REGION "," LIGHTS ",\"size\":@0}", "size: 0 is out of range 1 … 65536"},
     {"{" REGION "," LIGHTS ",\"size\":[8,@2147483648]}", "size[1]: 2.14748365e+09 is out of range 1 … 65536"},
     {"{" REGION "," LIGHTS ",@\"resolution\":64}", "resolution: unknown key"},
-    {"{" REGION "," LIGHTS ",@\"method\":\"exact\"}", "method: unknown key"},
     {"{" REGION ",\"lights\":@[]}", "lights: has 0 items, out of range 1 … 252"},
     {LIT("{\"name\":\"a\",\"type\":@\"sphere\"}"),
      "lights[0].type: \"sphere\" is none of directional, disc, spot"},
-    {LIT("{\"name\":\"a\",\"type\":\"disc\",\"position\":@[1,2,3]}"),
-     "lights[0].position: expected 2 numbers, found 3"},
-    {LIT("@{\"name\":\"a\",\"type\":\"disc\"}"),
-     "lights[0]: key \"position\" is missing: a disc light needs it"},
     {LIT("{\"name\":\"a\",\"type\":\"directional\",\"direction\":@[0,0]}"),
      "lights[0].direction: is zero, and so points nowhere"},
     {LIT("{\"name\":\"a\",\"type\":\"spot\",\"position\":[1,2],\"direction\":[0,1],\"inner_deg\":@50,"
@@ -332,28 +319,11 @@ static const struct {
      "lights[0].inner_deg: 50 is over outer_deg, 40"},
     {LIT("{\"name\":\"a\",\"type\":\"disc\",\"position\":[1,2],\"reach\":@0}"),
      "lights[0].reach: 0 is out of range 0 (excluded) … 1e+15"},
-    {LIT("{\"name\":\"a\",\"type\":\"disc\",\"position\":[1,2],@\"falloff\":\"none\"}"),
-     "lights[0].falloff: unknown key"},
-    {LIT(LAMP ",{\"name\":@\"a\",\"type\":\"disc\",\"position\":[1,2]}"),
-     "lights[1].name: \"a\" is the name of lights[0] too"},
     {WITH("@{}"), "casters[0]: key \"mask\", \"text\" or \"shape\" is missing"},
-    {WITH("{@\"mesh\":\"a.obj\"}"), "casters[0].mesh: unknown key; did you mean \"mask\"?"},
-    {WITH("{\"mask\":\"m\",@\"text\":\"t\"}"), "casters[0].text: cannot stand beside \"mask\""},
-    {WITH("@{\"mask\":\"m\"}"), "casters[0]: key \"size\" is missing: a mask needs it"},
     {WITH("{\"mask\":\"m\",\"size\":@0}"), "casters[0].size: 0 is out of range 0 (excluded) … 1e+15"},
-    {WITH("{\"mask\":\"m\",\"size\":[1,@-1]}"),
-     "casters[0].size[1]: -1 is out of range 0 (excluded) … 1e+15"},
-    {WITH("{\"mask\":\"m\",\"size\":1,@\"thickness\":1}"), "casters[0].thickness: unknown key"},
-    {WITH("{\"mask\":\"m\",\"size\":1,\"invert\":@1}"),
-     "casters[0].invert: expected true or false, found a number"},
-    {WITH("@{\"text\":\"m\",\"height\":1}"), "casters[0]: key \"font\" is missing: a text needs it"},
-    {WITH("{\"text\":@\"\",\"height\":1}"), "casters[0].text: is empty"},
     {WITH("{\"text\":\"a\",\"align\":@\"middle\"}"),
      "casters[0].align: \"middle\" is none of left, center, right"},
-    {WITH("{\"shape\":@\"star\"}"), "casters[0].shape: \"star\" is none of box"},
     {WITH("{\"shape\":\"box\",@\"threshold\":0.5}"), "casters[0].threshold: is no key of a box"},
-    {WITH("{\"shape\":\"box\",\"half_size\":[1,1],\"scale\":@[1,2]}"),
-     "casters[0].scale: expected a number, found an array"},
 };
 
 TEST(bad_scenes_are_refused_with_their_place) {

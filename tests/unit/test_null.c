@@ -24,7 +24,9 @@ static double far_away(void *user, const double position[3]) {
     return position[0];
 }
 
-TEST(casters_are_not_made_of_nothing) {
+static void far_away_all(void *user, size_t count, const double *positions, double *distances) {}
+
+TEST(casters_need_their_arguments) {
     const double square[8] = {-1, -1, 1, -1, 1, 1, -1, 1},
                  transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     const size_t corners = 4;
@@ -48,6 +50,10 @@ TEST(casters_are_not_made_of_nothing) {
     MAKES_NONE(vsh_grid_from_distance(&distance, NULL, NULL, PLACE, &error));
     distance.distance = far_away;
     REFUSED(vsh_grid_from_distance(&distance, NULL, NULL, NULL, &error));
+    distance.distance = NULL;
+    MAKES_NONE(vsh_grid_from_distances(NULL, far_away_all, NULL, NULL, PLACE, &error));
+    MAKES_NONE(vsh_grid_from_distances(&distance, NULL, NULL, NULL, PLACE, &error));
+    REFUSED(vsh_grid_from_distances(&distance, far_away_all, NULL, NULL, NULL, &error));
     MAKES_NONE(vsh_grid_unite(NULL, 1, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_grid_unite(&instance, 1, NULL, NULL, PLACE, &error));
     REFUSED(vsh_grid_unite(&instance, 1, NULL, NULL, NULL, &error));
@@ -68,7 +74,7 @@ TEST(casters_are_not_made_of_nothing) {
     REFUSED(vsh_outline_from_polygons(square, &corners, 1, NULL, NULL, &error));
 }
 
-TEST(files_have_paths_and_places) {
+TEST(file_calls_need_paths_and_places) {
     vsh_vdb_entry entry;
     size_t count;
     char digest[VSH_DIGEST_TEXT];
@@ -101,8 +107,15 @@ TEST(files_have_paths_and_places) {
     REFUSED(vsh_image_check("a.exr", NULL, NULL, &error));
 }
 
-TEST(scenes_are_not_made_of_nothing) {
+TEST(scenes_need_their_arguments) {
     const vsh_scene scene = {0};
+    vsh_scene set = vsh_scene_default();
+    vsh_flat_scene flat = vsh_flat_scene_default();
+    REFUSED(vsh_scene_set(NULL, "rays", "1", &error));
+    REFUSED(vsh_scene_set(&set, NULL, "1", &error));
+    REFUSED(vsh_receiver_set(NULL, "--size", "1", &error));
+    REFUSED(vsh_flat_scene_set(NULL, "--size", "1", &error));
+    REFUSED(vsh_flat_scene_set(&flat, NULL, "1", &error));
     MAKES_NONE(vsh_assets_load(NULL, NULL, PLACE, &error));
     REFUSED(vsh_assets_load(&scene, NULL, NULL, &error));
     MAKES_NONE(vsh_scene_casters(NULL, NULL, NULL, PLACE, &error));
@@ -126,7 +139,7 @@ static vsh_occluders *no_casters(void) {
     return casters;
 }
 
-TEST(shading_without_its_arguments_is_refused) {
+TEST(shading_needs_its_arguments) {
     OWNED(vsh_occluders) *casters = no_casters();
     const vsh_light light = vsh_light_default();
     const double positions[3] = {0, 0, 0};
@@ -165,7 +178,7 @@ TEST(shading_without_its_arguments_is_refused) {
     vsh_query_free(query);
 }
 
-TEST(baking_without_its_arguments_is_refused) {
+TEST(baking_needs_its_arguments) {
     OWNED(vsh_occluders) *casters = no_casters();
     OWNED(vsh_voxels) *voxels = NULL;
     OWNED(vsh_volume) *volume = NULL;
@@ -190,6 +203,8 @@ TEST(baking_without_its_arguments_is_refused) {
     const vsh_mesh one = mesh_of_arrays(NULL, corners, places, 3, triangle, 1);
     assert_int_equal(vsh_charts_create(&one, 1, NULL, NULL, NULL, &charts, &error), VSH_OK);
     REFUSED(stitch_one(charts, NULL, 1, NULL, NULL, NULL, &error));
+    REFUSED(vsh_lightmap_fill_hidden(charts, NULL, 0, NULL, NULL, &error));
+    REFUSED(vsh_lightmap_fill_hidden(NULL, &lightmap, 0, NULL, NULL, &error));
     vsh_charts_free(charts);
     REFUSED(vsh_flat_bake(NULL, NULL, &flat, &error));
     REFUSED(vsh_flat_bake(&plane, NULL, NULL, &error));
@@ -208,7 +223,7 @@ TEST(baking_without_its_arguments_is_refused) {
     REFUSED(vsh_volume_copy(volume, 0, index, size, NULL, &error));
 }
 
-TEST(drawing_and_comparing_without_their_arguments_are_refused) {
+TEST(drawing_and_comparing_need_their_arguments) {
     OWNED(vsh_occluders) *casters = no_casters();
     const vsh_surface nothing = {NULL, {0.5, 0.5, 0.5}};
     const vsh_light light = vsh_light_default();
@@ -219,7 +234,7 @@ TEST(drawing_and_comparing_without_their_arguments_are_refused) {
     float *const rgb[3] = {depth, depth, depth}, *const no_green[3] = {depth, NULL, depth};
     const double bounds[3] = {0, 0, 0};
     vsh_measures measures;
-    const vsh_compared compared = {0};
+    const vsh_compared compared = {0}, planeless = {.size = {1, 1, 1}};
     REFUSED(vsh_render(NULL, 1, casters, &light, 1, &options, NULL, &picture, NULL, &error));
     REFUSED(vsh_render(&nothing, 1, casters, &light, 1, &options, NULL, &picture, NULL, &error));
     REFUSED(vsh_render(NULL, 0, NULL, &light, 1, &options, NULL, &picture, NULL, &error));
@@ -235,6 +250,7 @@ TEST(drawing_and_comparing_without_their_arguments_are_refused) {
     REFUSED(vsh_picture_encode(&picture, SIDE, SIDE, 1.0, no_green, NULL, &error));
     REFUSED(vsh_compare(NULL, NULL, NULL, &measures, &error));
     REFUSED(vsh_compare(&compared, NULL, NULL, NULL, &error));
+    REFUSED(vsh_compare(&planeless, NULL, NULL, &measures, &error));
     vsh_accuracy accuracy;
     REFUSED(vsh_compare_accuracy(NULL, 1, NULL, &accuracy, &error));
     REFUSED(vsh_compare_accuracy(&compared, 1, NULL, &accuracy, &error));

@@ -229,24 +229,6 @@ TEST(a_rectangle_has_its_sides) {
     assert_true(l[0].two_sided == 1 && l[1].two_sided == 0);
 }
 
-TEST(every_example_in_the_scene_reference_is_valid) {
-    static const char start[] = "```json\n", end[] = "\n```";
-    FREED unsigned char *bytes = NULL;
-    read_all(VSH_ASSETS "/../docs/scene.md", &bytes);
-    size_t count = 0;
-    for (char *at = (char *)bytes; (at = strstr(at, start)) != NULL; ++count) {
-        at += sizeof start - 1;
-        char *stop = strstr(at, end);
-        assert_non_null(stop);
-        *stop = '\0';
-        vsh_scene *scene = parse("docs/scene.md", at);
-        assert_true(scene->receiver_count > 0);
-        vsh_scene_free(scene);
-        at = stop + 1;
-    }
-    assert_true(count >= 7);
-}
-
 /* --- scenes that are refused */
 
 /* A scene around a part, and the part's place in it. */
@@ -257,8 +239,6 @@ static const struct frame {
   sun = {"{'casters':[{'mesh':'a'}],\n'lights':[{'name':'a','type':'directional','direction':[0,1,0],", "}]}",
          "lights[0]"},
   lamp = {"{'casters':[{'mesh':'a'}],\n'lights':[{'name':'a','type':'sphere','position':[0,0,0],", "}]}",
-          "lights[0]"},
-  area = {"{'casters':[{'mesh':'a'}],\n'lights':[{'name':'a','type':'rectangle','position':[0,0,0],", "}]}",
           "lights[0]"},
   layer = {"{'casters':[{'mesh':'a'}],\n'layers':[{'name':'a',", "}]}", "layers[0]"},
   mesh = {"{'casters':[{'mesh':'a',", "}]}", "casters[0]"},
@@ -277,7 +257,6 @@ static const struct {
     {&bare, "", "1:1: '[' or '{' expected near end of file"},
     {&bare, "{\n 'casters': [nope]}", "2:17: invalid token near 'nope'"},
     {&bare, "{'casters': 1,\n 'casters': 2}", "2:10: duplicate object key near '\"casters\"'"},
-    {&bare, "{'voxel_size': NaN}", "1:18: invalid token near 'NaN'"},
     {&bare, "{'voxel_size': 1e999}", "1:20: real number overflow near '1e999'"},
     {&bare, "{} {}", "1:4: end of file expected near '{'"},
     /* the whole */
@@ -290,11 +269,9 @@ static const struct {
     {&whole, "'method':@'ré','xyzzy':1",
      "method: \"ré\" is none of hard, classic, practical, improved, smooth, cone, rays, adaptive, exact, "
      "auto"},
-    {&whole, "'method':'cone',@'xyzzy':1", "xyzzy: unknown key"},
     {&bare, "{'receivers':[],'\\u0061o':{'distance':1,@'cone':1}}",
      "ao.cone: unknown key; did you mean \"cones\"?"},
     {&whole, "'voxel_size':@0", "voxel_size: 0 is out of range 1e-12 … 1e+12"},
-    {&layer, "'voxel_size':@1e-13", ".voxel_size: 1e-13 is out of range 1e-12 … 1e+12"},
     {&whole, "'ao':{'distance':@5e-324}", "ao.distance: 4.94065646e-324 is out of range 1e-12 … 1e+15"},
     {&whole, "'voxel_size':@'1'", "voxel_size: expected a number, found a string"},
     {&whole, "'voxel_size':1,@'resolution':9", "resolution: cannot stand beside \"voxel_size\""},
@@ -305,36 +282,20 @@ static const struct {
     {&whole, "\n'layers':[{'name':'a'},{'name':@'a'}]", "layers[1].name: \"a\" is the name of layers[0] too"},
     {&layer, "'remap':@[0.5,0.5]", ".remap: expected two numbers that rise, found 0.5 and 0.5"},
     {&layer, "'softness':@-1", ".softness: -1 is out of range 0 … 1000"},
-    {&layer, "'combine':@'max'", ".combine: \"max\" is none of multiply, min"},
     {&layer, "'lights':[@'sun']", ".lights[0]: \"sun\" is none of the scene's lights"},
-    {&layer, "'voxel_size':1,@'resolution':9", ".resolution: cannot stand beside \"voxel_size\""},
     {&mesh, "'layer':@'b'}],'layers':[{'name':'a'", ".layer: \"b\" is none of the scene's layers"},
     {&whole, "'irradiance':@1", "irradiance: expected true or false, found a number"},
-    {&whole, "'irradiance':@null", "irradiance: expected true or false, found null"},
     {&whole, "'ao':@{}", "ao: key \"distance\" is missing: ao needs it"},
-    {&whole, "'ao':{'distance':1,'cones':@257}", "ao.cones: 257 is out of range 1 … 256"},
     {&whole, "'ao':{@'cones':8,'method':'taps','distance':1}", "ao.cones: is no key of ao by taps"},
-    {&whole, "'ao':{'method':@'ray'}",
-     "ao.method: \"ray\" is none of taps, cones, rays, adaptive, exact, auto"},
-    {&whole, "'sampler':@'green'", "sampler: \"green\" is none of sobol, white, blue"},
     /* casters */
-    {&bare, "{'casters':[{'mesh':'a'},@7]}", "casters[1]: expected an object, found a number"},
     {&caster, "@{}",
      ": key \"mesh\", \"sdf\", \"vdb\", \"heightfield\", \"spheres\", \"mask\" or \"text\" is missing"},
-    {&caster, "@{'mask':'a','size':1}", ": key \"thickness\" is missing: a mask caster needs it"},
     {&caster, "{'mask':'a','size':@0,'thickness':1}", ".size: 0 is out of range 0 (excluded) … 1e+15"},
     {&caster, "{'mask':'a','size':1,'thickness':@0}", ".thickness: 0 is out of range 0 (excluded) … 1e+15"},
-    {&caster, "{'text':'a','font':'f','height':@0,'thickness':1}",
-     ".height: 0 is out of range 0 (excluded) … 1e+15"},
     {&mesh, "@'thickness':1", ".thickness: is no key of a mesh caster"},
-    {&caster, "{'mask':'a',@'font':'f'}", ".font: is no key of a mask caster"},
     {&caster, "@{'text':'a','thickness':1,'height':1}", ": key \"font\" is missing: a text caster needs it"},
-    {&caster, "{'text':'a','transform':@{'scale':[1,1,2]},'font':'f','height':1,'thickness':1}",
-     ".transform: shears or scales unevenly, which a text caster cannot"},
-    {&caster, "{@'mush':'a'}", ".mush: unknown key; did you mean \"mesh\"?"},
     {&caster, "{'mesh':@''}", ".mesh: is empty"},
     {&caster, "{'vdb':'a',@'mesh':'a'}", ".mesh: cannot stand beside \"vdb\""},
-    {&mesh, "@'grid':'g'", ".grid: is no key of a mesh caster"},
     {&caster, "{'vdb':'a','transform':@{'scale':[1,1,2]}}",
      ".transform: shears or scales unevenly, which a vdb caster cannot"},
     {&mesh, "'transform':{'scale':@0}", ".transform.scale: 0 is out of range 1e-06 … 1000000"},
@@ -353,7 +314,6 @@ static const struct {
     {&tree, "@{}", ": key \"shape\" or \"op\" is missing"},
     {&tree, "{'shape':@'cube'}",
      ".shape: \"cube\" is none of sphere, box, torus, plane, capsule, cylinder, cone"},
-    {&tree, "{'op':@'xor'}", ".op: \"xor\" is none of union, intersection, subtraction, smooth_union"},
     {&tree, "{'op':'union',@'shape':'box'}", ".shape: cannot stand beside \"op\""},
     {&tree, "@{'shape':'sphere'}", ": key \"radius\" is missing: a sphere needs it"},
     {&tree, "{'shape':'sphere','radius':@0}", ".radius: 0 is out of range 0 (excluded) … 1e+15"},
@@ -365,7 +325,6 @@ static const struct {
     {&tree, "@{'op':'union'}", ": key \"of\" is missing: a union needs it"},
     {&tree, "{'op':'union','of':@[{'shape':'sphere','radius':1}]}",
      ".of: has 1 items, out of range 2 … 65536"},
-    {&tree, "{'op':'union',@'smoothing':1,'of':[]}", ".smoothing: is no key of a union"},
     {&tree, "{'op':'union','of':[{'shape':'sphere','radius':1},\n  {'shape':'sphere',\n@'radus':1}]}",
      ".of[1].radus: unknown key; did you mean \"radius\"?"},
     {&tree, "{'shape':'sphere','radius':1,'scale':@0}", ".scale: 0 is out of range 1e-06 … 1000000"},
@@ -375,12 +334,9 @@ static const struct {
     {&light, "{'name':'a','type':'directional','direction':@[0,0,-0.0]}",
      ".direction: is zero, and so points nowhere"},
     {&light, "{'name':'a','type':'directional',@'radius':1}", ".radius: is no key of a directional light"},
-    {&light, "{'name':'a',@'typ':'spot'}", ".typ: unknown key; did you mean \"type\"?"},
-    {&light, "@{'name':'a','radius':1}", ": key \"type\" is missing: a light needs it"},
     {&light, "{'name':'a','type':@'sun'}",
      ".type: \"sun\" is none of directional, sphere, spot, rectangle, file"},
     {&light, "@{'type':'sphere','position':[0,0,0]}", ": key \"name\" is missing: a sphere light needs it"},
-    {&light, "@{'name':'a','type':'sphere'}", ": key \"position\" is missing: a sphere light needs it"},
     {&light, "{'name':@'a b','type':'sphere'}",
      ".name: \"a b\" cannot name a light: expected 1 … 63 of A … Z, a … z, 0 … 9, _ and -"},
     {&whole,
@@ -395,51 +351,33 @@ static const struct {
     {&lamp, "'color':[1,@-1,1]", ".color[1]: -1 is out of range 0 … 1e+15"},
     {&light, "@{'name':'a','type':'rectangle','position':[0,0,0],'edge_u':[1,0,0]}",
      ": key \"edge_v\" is missing: a rectangle light needs it"},
-    {&area, "'edge_u':@[0,0,0]", ".edge_u: is zero, and so points nowhere"},
-    {&area, "'two_sided':@1", ".two_sided: expected true or false, found a number"},
     {&light, "@{'name':'a','type':'rectangle','position':[0,0,0],'edge_u':[1,0,0],'edge_v':[1,1,0]}",
      ": light 'a': edge_u and edge_v are not at right angles: the cosine between them is 0.707106781, of at "
      "most 0.001"},
-    {&lamp, "@'edge_u':[1,0,0]", ".edge_u: is no key of a sphere light"},
     /* heightfields */
     {&caster, "@{'heightfield':'a','height':1}",
      ": key \"extent\" is missing: a heightfield caster needs it"},
-    {&caster, "@{'heightfield':'a','size':[1,1]}",
-     ": key \"height\" is missing: a heightfield caster needs it"},
     {&caster, "{'heightfield':'a','height':1,'size':[1,@0]}", ".size[1]: 0 is out of range 1e-12 … 1e+12"},
     {&terrain, "'base':@0", ".base: 0 is out of range 0 (excluded) … 1e+12"},
-    {&mesh, "@'height':1", ".height: is no key of a mesh caster"},
-    {&terrain, "'transform':@{'scale':[1,1,2]}",
-     ".transform: shears or scales unevenly, which a heightfield caster cannot"},
     {&terrain, "@'voxelised':true", ".voxelised: is no key of a heightfield caster"},
     /* spheres */
     {&caster, "{'spheres':@7}", ".spheres: expected a file's name or an array of [x, y, z, radius]"},
-    {&caster, "{'spheres':@''}", ".spheres: is empty"},
     {&caster, "{'spheres':@[]}", ".spheres: is empty"},
     {&caster, "{'spheres':[[1,2,3,4],@[1,2,3]]}", ".spheres[1]: expected 4 numbers, found 3"},
     {&caster, "{'spheres':[[1,2,3,@-4]]}", ".spheres[0][3]: -4 is out of range 0 (excluded) … 1e+15"},
     {&caster, "{'spheres':[[1,2,@1e16,4]]}", ".spheres[0][2]: 1e+16 is out of range -1e+15 … 1e+15"},
     {&caster, "{'spheres':[[1,2,3,4]],'transform':@{'scale':[1,1,2]}}",
      ".transform: shears or scales unevenly, which a caster of spheres cannot"},
-    {&receiver, "{'mesh':'m',@'heightfield':'h'}", ".heightfield: cannot stand beside \"mesh\""},
     {&receiver, "{'heightfield':'h',@'uv_set':0}", ".uv_set: is no key of a heightfield receiver"},
-    {&receiver, "@{'heightfield':'h','height':1,'output':'p'}",
-     ": key \"extent\" is missing: a heightfield receiver needs it"},
     {&receiver, "{'mesh':'m',@'plane':{}}", ".plane: cannot stand beside \"mesh\""},
     {&receiver, "{'plane':@{},'output':'p'}", ".plane: key \"size\" is missing: a plane needs it"},
-    {&receiver, "{'plane':{'size':[1,1],'normal':@[0,0,0]},'output':'p'}",
-     ".plane.normal: is zero, and so points nowhere"},
-    {&receiver, "{'plane':{},@'uv_set':1}", ".uv_set: is no key of a plane receiver"},
     {&bare, "{'region':@[0,0,1,1]}", "region: belongs to flat scenes, which 'vdbshade flat' bakes"},
     /* receivers */
     {&receiver, "@{}", ": key \"mesh\" is missing: a receiver needs it"},
-    {&receiver, "@{'mesh':'m'}", ": key \"output\" is missing: a receiver needs it"},
     {&receiver, "{'output':@'o','mesh':'m'}", ".output: \"o\" is the output of receivers[0] too"},
     {&receiver, "{'size':@0}", ".size: 0 is out of range 1 … 65536"},
     {&receiver, "{'size':@[1]}", ".size: expected 2 numbers, found 1"},
-    {&receiver, "{'size':[1,@0]}", ".size[1]: 0 is out of range 1 … 65536"},
     {&receiver, "{'bits':@12}", ".bits: 12 is none of 0, 8, 16, 32"},
-    {&receiver, "{'pack':@''}", ".pack: is empty"},
 };
 
 /* Takes the @ out of a text and writes quotes; the message then begins with the line and the column of the @.
@@ -607,7 +545,7 @@ TEST(the_library_accepts_all_values_that_the_table_of_keys_accepts) {
     assert_true(tried >= 20);
 }
 
-TEST(bytes_that_are_no_text_do_not_reach_messages) {
+TEST(messages_replace_bytes_that_are_not_utf_8) {
     vshi_fail(&failure, VSH_ERROR_INPUT, "%s: type '%s' × %.4s", "caf\xe9.json", "\xff\xc0\x80 é", "abc…");
     assert_string_equal(failure.message, "caf?.json: type '??? é' × abc?");
 }
@@ -621,8 +559,6 @@ TEST(files_that_cannot_be_read_are_refused) {
         vsh_result code;
         const char *message;
     } files[] = {
-        {"no/such.json", VSH_ERROR_READ, "no/such.json: cannot be read: No such file or directory"},
-        {VSH_ASSETS, VSH_ERROR_READ, ""},
         {"/dev/zero", VSH_ERROR_READ, "/dev/zero: cannot be read: it is no regular file"},
         {large, VSH_ERROR_LIMIT, ": is larger than the 67108864 bytes that such a file may have"},
     };
@@ -703,7 +639,7 @@ TEST(reading_takes_less_than_the_least_limit_that_it_passes) {
     }
 }
 
-TEST(a_bomb_is_refused_before_it_is_read) {
+TEST(a_file_that_parses_into_too_much_memory_is_refused_unread) {
     free(write_scene("{}", 300000));
     const size_t before = taken();
     assert_false(passes((size_t)50 << 20));

@@ -79,10 +79,6 @@ TEST(refused_settings_change_nothing) {
                     "%s %s: %s: %s", cases[i].name, cases[i].text, vsh_result_name(result), failure.message);
         assert_memory_equal(&scene, &before, sizeof scene);
     }
-    vsh_scene scene = vsh_scene_default();
-    assert_int_equal(vsh_scene_set(NULL, "rays", "1", &failure), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_scene_set(&scene, NULL, "1", &failure), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_receiver_set(NULL, "--size", "1", &failure), VSH_ERROR_ARGUMENT);
 }
 
 TEST(settings_of_a_flat_scene_are_its_own) {
@@ -107,8 +103,6 @@ TEST(settings_of_a_flat_scene_are_its_own) {
     assert_memory_equal(&flat, &before, sizeof flat);
     vsh_scene scene = vsh_scene_default();
     assert_int_equal(vsh_scene_set(&scene, "supersample", "3", &failure), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_flat_scene_set(NULL, "--size", "1", &failure), VSH_ERROR_ARGUMENT);
-    assert_int_equal(vsh_flat_scene_set(&flat, NULL, "1", &failure), VSH_ERROR_ARGUMENT);
 }
 
 /* --- docs/scene.md, docs/flat.md */
@@ -185,10 +179,4 @@ TEST(the_document_has_every_key_with_its_range_and_default) {
         }
     }
     assert_true(count >= 33 && ranges >= 19 && defaults >= 12);
-}
-
-TEST(settings_end) {
-    vsh_setting setting = {.group = 77};
-    assert_int_equal(vsh_setting_get(100000, &setting), 0);
-    assert_int_equal(setting.group, 77);
 }
