@@ -542,15 +542,6 @@ TEST(every_part_has_its_bits_for_any_threads_and_instruction_set) {
     assert_false(wrong);
 }
 
-TEST(parts_have_bits_of_their_own) {
-    for (size_t i = 0; i < COUNT_OF(parts); ++i) {
-        for (size_t j = 0; j < i; ++j) {
-            assert_that(parts[i].hash != parts[j].hash, "%s has the bits of %s", parts[i].name,
-                        parts[j].name);
-        }
-    }
-}
-
 /* --- the host's floating-point environment */
 
 #if defined(__x86_64__)
@@ -649,13 +640,6 @@ TEST(an_instruction_set_that_is_missing_or_unknown_is_refused_by_name) {
     run.struct_size = offsetof(vsh_run, isa);
     assert_ok(
         vsh_shade_shadow(occluders_of(field), &points, &light, NULL, &run, &value, NULL, NULL, &failure));
-}
-
-TEST(the_best_instruction_set_is_one_of_this_machine) {
-    assert_true(vshi_isa_available(VSH_ISA_BASE) && vshi_isa_available(VSH_ISA_BEST));
-    assert_false(vshi_isa_available(-1) || vshi_isa_available(VSHI_ISA_COUNT));
-    const int32_t best = vshi_isa_resolve(VSH_ISA_BEST);
-    assert_true(best >= VSH_ISA_BASE && vshi_isa_available(best));
 }
 
 int main(void) {

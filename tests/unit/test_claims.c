@@ -1,7 +1,6 @@
 /* Reported errors of shadow and AO against closed forms: the true error is at most the error asked for, and
  * the report is at least 0.9 of it. Edges, corners, slits and discs, by every sampler, in lightmaps and of
  * single points. */
-#include "rays.h"
 #include "shading.h"
 #include "texels_of.h"
 #include "truth/directions.h"
@@ -343,7 +342,7 @@ static int claims(bool ao, bool exact, int32_t sampler, int last) {
     return wrong;
 }
 
-TEST(exact_reports_its_error_and_keeps_the_one_asked_for) {
+TEST(exact_reports_its_error_and_keeps_the_requested_one) {
     for (int ao = 0; ao < 2; ++ao) {
         assert_int_equal(claims(ao, true, VSH_SAMPLER_SOBOL, 5), 0);
     }
@@ -395,27 +394,4 @@ TEST(ends_of_penumbrae_do_not_collapse) {
         .method = VSH_SHADOW_EXACT, .max_error = 0.005, .width = 256, .height = 32, .lightmap = true};
     const outcome o = try(s, &t);
     assert_true(o.worst < 0.025 && o.rays < 200.0);
-}
-
-/* The forms themselves, by rays. */
-TEST(closed_forms_are_what_many_rays_see) {
-    const double at[][2] = {{0.1, 0.05},  {-0.2, 0.1}, {0.03, -0.11},
-                            {-0.3, -0.2}, {0.2, -0.3}, {-0.05, 0.31}};
-    for (int k = 0; k < 2 * SHAPES; ++k) {
-        FREED_BY(free_stage) stage *s = make_stage(k / 2, k % 2, 0.25);
-        for (size_t i = 0; i < COUNT_OF(at); ++i) {
-            const double x = s->ao && s->shape != DISC ? -fabs(at[i][0]) : at[i][0];
-            const double z = s->ao && s->shape != DISC ? -fabs(at[i][1]) : at[i][1];
-            const double p[3] = {x, 0.0, z};
-            const float up[3] = {0.0f, 1.0f, 0.0f};
-            const vsh_light light = sun((double[]){0.0, 1.0, 0.0}, 2.0 * atan(WIDE));
-            float seen = -1.0f;
-            if (s->ao) {
-                see_sky(s->triangles, NULL, 1, p, up, 0.0, s->shape == DISC ? 100.0 : DISTANCE, 65536, &seen);
-            } else {
-                see_light(s->triangles, NULL, 1, p, up, 0.0, &light, 65536, &seen);
-            }
-            assert_true(fabs((double)seen - truth_at(s, x, z)) < 5e-4);
-        }
-    }
 }

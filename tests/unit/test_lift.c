@@ -12,16 +12,6 @@ enum { ROWS = 8, WIDTH = 256, HEIGHT = 128, TEXELS = WIDTH * HEIGHT };
 
 static const double HAIR = 1e-5; /* above the facets, for truth */
 
-/* A box without UVs: it casts only. */
-typedef struct box {
-    float positions[24];
-    vsh_mesh mesh;
-} box;
-
-static void make_box(box *b, const double low[3], const double high[3]) {
-    b->mesh = box_mesh(b->positions, low, high);
-}
-
 /* A smooth sphere of radius 1 that is baked, and what casts on it. */
 typedef struct scene {
     sphere ball;
@@ -32,9 +22,9 @@ typedef struct scene {
     texel_samples lifted, flat;
 } scene;
 
-static void open_scene(scene *s, const box *other) {
+static void open_scene(scene *s, const vsh_mesh *other) {
     make_sphere(&s->ball, ROWS, 1.0);
-    const vsh_mesh casters[2] = {s->ball.mesh, other != NULL ? other->mesh : (vsh_mesh){0}};
+    const vsh_mesh casters[2] = {s->ball.mesh, other != NULL ? *other : (vsh_mesh){0}};
     const size_t count = other != NULL ? 2 : 1;
     vsh_grid_options grid_options = vsh_grid_options_default();
     grid_options.resolution = 64;
@@ -62,9 +52,10 @@ static void open_scene(scene *s, const box *other) {
 }
 
 /* Beyond x = face. */
-static void open_beside_wall(scene *s, box *wall, double face) {
-    make_box(wall, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
-    open_scene(s, wall);
+static void open_beside_wall(scene *s, double face) {
+    float corners[24];
+    const vsh_mesh wall = box_mesh(corners, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
+    open_scene(s, &wall);
 }
 
 /* The value that was baked at a sample. */
@@ -92,12 +83,8 @@ static double dot(const float *a, const double *b) {
 
 /* Half a degree wide. */
 static vsh_light sun_towards(double x, double y, double z) {
-    vsh_light light = vsh_light_default();
-    const double length = sqrt(x * x + y * y + z * z);
-    light.direction[0] = x / length;
-    light.direction[1] = y / length;
-    light.direction[2] = z / length;
-    return light;
+    const double length = length3((double[]){x, y, z});
+    return sun((double[]){x / length, y / length, z / length}, vsh_light_default().angle);
 }
 
 /* The direction to a light, and how far it is. */
@@ -105,7 +92,7 @@ static double towards(const vsh_light *light, const double *from, double to[3]) 
     for (int k = 0; k < 3; ++k) {
         to[k] = light->type == VSH_LIGHT_DIRECTIONAL ? light->direction[k] : light->position[k] - from[k];
     }
-    const double length = sqrt(to[0] * to[0] + to[1] * to[1] + to[2] * to[2]);
+    const double length = length3(to);
     for (int k = 0; k < 3; ++k) {
         to[k] /= length;
     }
@@ -115,8 +102,8 @@ static double towards(const vsh_light *light, const double *from, double to[3]) 
 /* A bar over the sphere: its shadow is narrower than two of the lifts that would move it. */
 TEST(rays_to_a_light_well_above_a_facet_begin_on_it) {
     static float shadow[TEXELS], truth[TEXELS], *const planes[1] = {shadow};
-    box bar;
-    make_box(&bar, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
+    float corners[24];
+    const vsh_mesh bar = box_mesh(corners, (double[]){-0.03, 1.05, -1.0}, (double[]){0.0, 1.08, 1.0});
     FREED_BY(close_scene) scene s;
     open_scene(&s, &bar);
     vsh_light lights[2] = {sun_towards(1.0, 1.0, 0.1), sun_towards(0.0, 0.0, 1.0)};
@@ -207,9 +194,8 @@ TEST(pictures_show_no_facets_where_light_grazes_a_smooth_sphere) {
 TEST(samples_are_valid_by_where_their_facets_are) {
     static const double FACE = 0.953, CLEAR = 1e-4;
     static float ao[TEXELS], coverage[TEXELS];
-    box wall;
     FREED_BY(close_scene) scene s;
-    open_beside_wall(&s, &wall, FACE);
+    open_beside_wall(&s, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao, .coverage = coverage});
     size_t between = 0, wrong = 0;
     for (size_t i = 0; i < s.flat.count; ++i) {
@@ -226,9 +212,8 @@ TEST(samples_are_valid_by_where_their_facets_are) {
 TEST(ao_close_to_a_wall_is_that_of_the_facets) {
     static const double FACE = 1.018;
     static float ao[TEXELS], truth[TEXELS];
-    box wall;
     FREED_BY(close_scene) scene s;
-    open_beside_wall(&s, &wall, FACE);
+    open_beside_wall(&s, FACE);
     bake(&s, NULL, 0, &(vsh_lightmap){.ao = ao});
     see_sky(s.triangles, NULL, s.flat.count, s.flat.positions, s.lifted.normals, HAIR, 0.1, 256, truth);
     size_t under = 0;
@@ -283,10 +268,10 @@ static double mean_ao_between_walls(const float *normals) {
     quad strip;
     make_quad(&strip, 0.0f, 0.0f, 0.1f, 1.0f);
     strip.mesh.normals = normals;
-    box walls[2];
-    make_box(&walls[0], (double[]){-0.1, 0.0, -0.1}, (double[]){0.0, 3.0, 0.1});
-    make_box(&walls[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1});
-    const vsh_mesh casters[3] = {strip.mesh, walls[0].mesh, walls[1].mesh};
+    float corners[2][24];
+    const vsh_mesh casters[3] = {strip.mesh,
+                                 box_mesh(corners[0], (double[]){-0.1, 0.0, -0.1}, (double[]){0.0, 3.0, 0.1}),
+                                 box_mesh(corners[1], (double[]){0.2, 0.0, -0.1}, (double[]){0.3, 3.0, 0.1})};
     OWNED(vshi_triangles) *triangles = triangles_from(casters, 3);
     OWNED(vsh_occluders) *occluders = occluders_from_triangles(triangles);
     vsh_lightmap_options options = vsh_lightmap_options_default();
@@ -329,10 +314,8 @@ TEST(a_lift_fades_near_other_triangles) {
     static double before[TEXELS];
     for (int w = 0; w < WALLS; ++w) {
         const double face = FIRST + STEP * w;
-        box wall;
-        make_box(&wall, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
         FREED_BY(close_scene) scene s;
-        open_scene(&s, &wall);
+        open_beside_wall(&s, face);
         const vshi_lifter lifter = vshi_lifter_open(occluders_traced(s.field, s.triangles), &light);
         for (size_t i = 0; i < s.flat.count; ++i) {
             const vshi_lift_point point = vshi_sample_lift_point(&s.texels->all, i);

@@ -4,35 +4,34 @@
 #include "testing.h"
 #include "truth/metrics.h"
 
-TEST(meshes_make_the_field_and_triangles_that_their_parts_make) {
+TEST(occluders_have_the_field_that_their_grid_makes) {
+    const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     const vsh_mesh mesh = plate_mesh();
     vsh_occluders_options options = vsh_occluders_options_default();
     options.grid.resolution = 64;
     options.reach = 2.0;
-    OWNED(vsh_occluders) *made = NULL, *bare = NULL;
-    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
-    vsh_grid *grid = NULL;
-    assert_ok(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &failure));
-    OWNED(vsh_field) *field = field_of_grid(grid, options.reach);
-    const vshi_occluder_parts parts = parts_of(made);
-    assert_non_null(parts.triangles);
-    assert_ptr_equal(parts.triangles, parts.true_triangles);
-    uint64_t counter = 7;
-    for (int i = 0; i < 200; ++i) {
-        const double at[3] = {between(&counter, -2, 2), between(&counter, -2, 2), between(&counter, -2, 2)};
-        assert_int_equal(bits_of(distance_at(parts.field, at)), bits_of(distance_at(field, at)));
+    for (int meshes = 0; meshes < 2; ++meshes) {
+        OWNED(vsh_occluders) *made = NULL;
+        vsh_grid *grid = NULL;
+        if (meshes) {
+            assert_ok(vsh_grid_from_meshes(&mesh, 1, &options.grid, NULL, &grid, &failure));
+            assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &made, &failure));
+        } else {
+            grid = grid_of((truth_scene){&solid, 1}, 0.125);
+            assert_ok(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure));
+        }
+        OWNED(vsh_field) *field = field_of_grid(grid, options.reach);
+        const vshi_occluder_parts parts = parts_of(made);
+        const vsh_field_info ours = field_info(parts.field), theirs = field_info(field);
+        assert_memory_equal(&ours, &theirs, sizeof ours);
+        assert_true((parts.triangles != NULL) == meshes && parts.layer_count == 0);
+        assert_true(!meshes || parts.triangles == parts.true_triangles);
+        const vsh_occluders_info info = occluders_info(made);
+        assert_true(info.field_bytes == ours.bytes && info.bricks == ours.bricks);
+        assert_true(info.voxel_size == ours.voxel_size && info.levels == ours.levels);
+        assert_true(!meshes || (info.grid_bytes > 0 && info.voxelize_s > 0.0 && info.field_s > 0.0));
+        assert_true(info.has_triangles == meshes && (info.triangles_bytes > 0) == meshes);
     }
-    const vsh_field_info of_field = field_info(field);
-    vsh_occluders_info info = occluders_info(made);
-    assert_true(info.field_bytes == of_field.bytes && info.bricks == of_field.bricks);
-    assert_true(info.voxel_size == of_field.voxel_size && info.levels == of_field.levels);
-    assert_true(info.grid_bytes > 0 && info.voxelize_s > 0.0 && info.field_s > 0.0);
-    assert_true(info.has_triangles);
-
-    options.triangles = 0;
-    assert_ok(vsh_occluders_create(&mesh, 1, &options, NULL, &bare, &failure));
-    info = occluders_info(bare);
-    assert_true(info.has_triangles == 0 && info.triangles_bytes == 0);
 }
 
 TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
@@ -61,39 +60,9 @@ TEST(bad_meshes_and_options_are_refused_with_nothing_made) {
     }
 }
 
-static vshi_spheres *unit_sphere(void) {
-    static const double ball[] = {0, 0, 0, 1};
-    vshi_spheres *spheres = NULL;
-    assert_ok(vshi_spheres_create(ball, 1, NULL, NULL, &spheres, &failure));
-    return spheres;
-}
-
-static void expect_refused(const vshi_occluder_parts *parts, const char *text) {
-    vsh_occluders *made = (vsh_occluders *)&failure;
-    assert_fails(vshi_occluders_make(parts, NULL, &made, &failure), VSH_ERROR_ARGUMENT, text);
-    assert_null(made);
-}
-
-TEST(bad_parts_of_occluders_are_refused_by_name) {
-    OWNED(vshi_spheres) *spheres = unit_sphere();
-    vshi_occluder_parts parts = {.field = NULL};
-    expect_refused(&parts, "neither a field nor triangles nor layers");
-    parts.voxel_size = -1.0;
-    expect_refused(&parts, "voxel_size");
-    parts = (vshi_occluder_parts){.field = NULL};
-    parts.layer_count = (size_t)1 << 40; /* is no reason to ask for memory */
-    expect_refused(&parts, "1099511627776 layers at NULL: expected at most 128");
-    vshi_layer layers[2] = {vshi_layer_default(), vshi_layer_default()};
-    layers[0].spheres = spheres;
-    parts.layers = layers;
-    parts.layer_count = VSHI_MAX_LAYERS + 1;
-    expect_refused(&parts, "expected at most 128");
-    parts.layer_count = 2;
-    expect_refused(&parts, "layer 1: none of field, heights and spheres");
-}
-
 TEST(layers_without_a_field_define_the_unit_of_offsets) {
-    OWNED(vshi_spheres) *spheres = unit_sphere();
+    OWNED(vshi_spheres) *spheres = NULL;
+    assert_ok(vshi_spheres_create((const double[]){0, 0, 0, 1}, 1, NULL, NULL, &spheres, &failure));
     const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
     OWNED(vsh_field) *field = field_of((truth_scene){&solid, 1}, 0.125, 1.0);
     vshi_layer layers[2] = {vshi_layer_default(), vshi_layer_default()};
@@ -117,23 +86,6 @@ TEST(layers_without_a_field_define_the_unit_of_offsets) {
         assert_true((counted.field_bytes > 0) == (cases[i].layers == 2));
         assert_true(counted.voxel_size == (cases[i].layers == 2 ? 0.125 : 0.0));
     }
-}
-
-TEST(a_level_set_makes_the_field_that_vsh_field_create_makes) {
-    static const truth_solid solid = {.shape = TRUTH_SPHERE, .radius = 0.5};
-    vsh_grid *grid = grid_of((truth_scene){&solid, 1}, 0.125);
-    vsh_occluders_options options = vsh_occluders_options_default();
-    options.reach = -1.0;
-    OWNED(vsh_occluders) *made = (vsh_occluders *)&failure;
-    assert_fails(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure), VSH_ERROR_ARGUMENT, "");
-    assert_null(made);
-    options.reach = 3.0;
-    assert_ok(vsh_occluders_from_grid(grid, &options, NULL, &made, &failure));
-    const vshi_occluder_parts parts = parts_of(made);
-    assert_true(parts.triangles == NULL && parts.layer_count == 0);
-    OWNED(vsh_field) *field = field_of_grid(grid, 3.0);
-    const vsh_field_info ours = field_info(parts.field), theirs = field_info(field);
-    assert_memory_equal(&ours, &theirs, sizeof ours);
 }
 
 /* A point under the plate, half in its shadow. */
@@ -206,7 +158,7 @@ TEST(a_scene_keeps_the_truth_only_where_an_error_is_kept) {
     assert_null(of_scene(cases[2].text, &options, VSH_ERROR_ARGUMENT));
 }
 
-TEST(more_layers_than_can_be_are_refused) {
+TEST(more_than_128_layers_are_refused) {
     const double ball[4] = {0, 0, 0, 1};
     vsh_caster casters[VSHI_MAX_LAYERS + 1] = {{.type = VSH_CASTER_SPHERES}};
     for (size_t i = 0; i <= VSHI_MAX_LAYERS; ++i) {
@@ -557,8 +509,24 @@ TEST(lightmaps_are_the_same_however_casters_are_layered) {
     }
 }
 
-TEST(layers_out_of_range_are_refused) {
+TEST(bad_parts_and_layers_are_refused_by_name) {
     OWNED(vsh_field) *empty = field_of_nothing(0.05);
+    const vshi_layer none = vshi_layer_default();
+    const struct {
+        const char *message;
+        vshi_occluder_parts parts;
+    } bad[] = {
+        {"neither a field nor triangles nor layers", {.field = NULL}},
+        {"voxel_size", {.voxel_size = -1.0}},
+        {"1099511627776 layers at NULL: expected at most 128", {.layer_count = (size_t)1 << 40}},
+        {"expected at most 128", {.layers = &none, .layer_count = VSHI_MAX_LAYERS + 1}},
+    };
+    for (size_t i = 0; i < COUNT_OF(bad); ++i) {
+        vsh_occluders *made = (vsh_occluders *)&failure;
+        assert_fails(vshi_occluders_from_parts(&bad[i].parts, &made, &failure), VSH_ERROR_ARGUMENT,
+                     bad[i].message);
+        assert_null(made);
+    }
     const vsh_light light = sun(towards, 0.2);
     const vsh_points points = {1, positions, normals, NULL};
     float value;

@@ -249,7 +249,7 @@ TEST(the_nearest_surface_has_its_own_color) {
     }
 }
 
-TEST(who_looks_from_within_sees_out) {
+TEST(a_camera_inside_a_solid_sees_out) {
     OWNED(vsh_field) *within = ball(0.0, 0.0, 0.0, 1.0, 0.05), *beyond = ball(4.0, 0.0, 0.0, 1.0, 0.05);
     const vsh_surface surfaces[2] = {{within, {0.5, 0.5, 0.5}}, {beyond, {0.5, 0.5, 0.5}}};
     const vsh_render_options o = small(camera_at(0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 20.0), 1);
@@ -320,63 +320,55 @@ TEST(cameras_that_see_nothing_are_refused) {
     }
 }
 
-TEST(a_framed_box_fills_the_picture) {
-    const double low[3] = {-3.0, 0.0, 1.0}, high[3] = {2.0, 1.0, 4.0};
-    const double ups[3][3] = {{0.0, 1.0, 0.0}, {0.0, 0.0, 2.0}, {0.3, 0.5, -0.2}};
-    for (int u = 0; u < 3; ++u) {
-        for (double azimuth = 0.0; azimuth < 6.0; azimuth += 0.7) {
-            vsh_camera camera = vsh_camera_default();
-            memcpy(camera.up, ups[u], sizeof camera.up);
-            assert_ok(vsh_camera_frame(&camera, low, high, azimuth, 0.4, (double)WIDE / HIGH, &failure));
-            assert_ok(vsh_camera_orbit(&camera, 0.0, &failure));
-            const pinhole p = pinhole_of(&camera);
-            double most = 0.0;
-            for (int corner = 0; corner < 8; ++corner) {
-                double to[3];
-                for (int i = 0; i < 3; ++i) {
-                    to[i] = (corner >> i & 1 ? high[i] : low[i]) - p.eye[i];
-                }
-                const double away = dot3(to, p.forward);
-                most = fmax(most, fabs(dot3(to, p.right)) / (away * p.pixel * 0.5 * WIDE));
-                most = fmax(most, fabs(dot3(to, p.up)) / (away * p.pixel * 0.5 * HIGH));
-                assert_true(away > 0.0);
-            }
-            assert_true(most < 1.0 && most > 0.9);
+/* Checks that all points lie before the camera, and finds the ends of their picture: -1 … 1 is all of it. */
+static void assert_framed(vsh_camera camera, size_t count, const double (*points)[3], double low[2],
+                          double high[2]) {
+    assert_ok(vsh_camera_orbit(&camera, 0.0, &failure));
+    const pinhole p = pinhole_of(&camera);
+    low[0] = low[1] = INFINITY;
+    high[0] = high[1] = -INFINITY;
+    for (size_t i = 0; i < count; ++i) {
+        double to[3];
+        go_along(points[i], -1.0, p.eye, to);
+        const double away = dot3(to, p.forward);
+        const double at[2] = {dot3(to, p.right) / (away * p.pixel * 0.5 * WIDE),
+                              dot3(to, p.up) / (away * p.pixel * 0.5 * HIGH)};
+        assert_true(away > 0.0);
+        for (int axis = 0; axis < 2; ++axis) {
+            low[axis] = fmin(low[axis], at[axis]);
+            high[axis] = fmax(high[axis], at[axis]);
         }
     }
 }
 
-/* Points in a ball: the nearest place from which all are seen, one at an edge of each pair at least. */
-TEST(framed_points_fill_the_picture) {
+TEST(framed_boxes_and_points_fill_the_picture) {
     enum { COUNT = 50 };
-    double points[COUNT][3];
+    const double ups[3][3] = {{0.0, 1.0, 0.0}, {0.0, 0.0, 2.0}, {0.3, 0.5, -0.2}},
+                 aspect = (double)WIDE / HIGH;
+    double box[8][3], points[COUNT][3], low[2], high[2];
+    for (int i = 0; i < 8; ++i) {
+        memcpy(box[i], (double[]){i & 1 ? 2.0 : -3.0, i & 2 ? 1.0 : 0.0, i & 4 ? 4.0 : 1.0}, sizeof box[i]);
+    }
     for (int i = 0; i < COUNT; ++i) {
         points[i][0] = 5.0 + 3.0 * sin(12.9898 * i + 1.0);
         points[i][1] = 0.7 * sin(78.233 * i + 2.0);
         points[i][2] = -2.0 + sin(37.719 * i + 3.0);
     }
-    for (double azimuth = 0.0; azimuth < 6.0; azimuth += 0.7) {
-        vsh_camera camera = vsh_camera_default();
-        assert_ok(vsh_camera_frame_points(&camera, COUNT, &points[0][0], azimuth, 0.4, (double)WIDE / HIGH,
-                                          &failure));
-        assert_ok(vsh_camera_orbit(&camera, 0.0, &failure));
-        const pinhole p = pinhole_of(&camera);
-        double low[2] = {1e9, 1e9}, high[2] = {-1e9, -1e9};
-        for (int i = 0; i < COUNT; ++i) {
-            const double to[3] = {points[i][0] - p.eye[0], points[i][1] - p.eye[1], points[i][2] - p.eye[2]};
-            const double away = dot3(to, p.forward);
-            const double at[2] = {dot3(to, p.right) / (away * p.pixel * 0.5 * WIDE),
-                                  dot3(to, p.up) / (away * p.pixel * 0.5 * HIGH)};
-            assert_true(away > 0.0);
-            for (int axis = 0; axis < 2; ++axis) {
-                low[axis] = fmin(low[axis], at[axis]);
-                high[axis] = fmax(high[axis], at[axis]);
-            }
+    for (int u = 0; u < 3; ++u) {
+        for (double azimuth = 0.0; azimuth < 6.0; azimuth += 0.7) {
+            vsh_camera camera = vsh_camera_default();
+            memcpy(camera.up, ups[u], sizeof camera.up);
+            assert_ok(vsh_camera_frame(&camera, box[0], box[7], azimuth, 0.4, aspect, &failure));
+            assert_framed(camera, 8, (const double(*)[3])box, low, high);
+            const double most = fmax(fmax(high[0], high[1]), -fmin(low[0], low[1]));
+            assert_true(most < 1.0 && most > 0.9);
+            assert_ok(vsh_camera_frame_points(&camera, COUNT, points[0], azimuth, 0.4, aspect, &failure));
+            assert_framed(camera, COUNT, (const double(*)[3])points, low, high);
+            const double size[2] = {0.5 * (high[0] - low[0]), 0.5 * (high[1] - low[1])};
+            const int larger = size[0] > size[1] ? 0 : 1;
+            assert_true(size[larger] > 0.8 && size[larger] < 0.9);
+            assert_true(fabs(high[larger] + low[larger]) < 1e-9); /* in the middle */
         }
-        const double wide = 0.5 * (high[0] - low[0]), tall = 0.5 * (high[1] - low[1]);
-        assert_true(fmax(wide, tall) > 0.8 && fmax(wide, tall) < 0.9);
-        const int larger = wide > tall ? 0 : 1;
-        assert_true(fabs(high[larger] + low[larger]) < 1e-9); /* in the middle */
     }
 }
 

@@ -4,6 +4,7 @@
 
 #include "field/field.h"
 #include "trace/trace.h"
+#include "truth/metrics.h"
 
 #define VOXEL 0.04
 
@@ -206,14 +207,6 @@ static void shade_floor(const vsh_field *field, int32_t threads, size_t size, fl
     assert_ok(vsh_shade_ao(occluders_of(field), &points, &options, &run, ao, NULL, NULL, NULL, &failure));
 }
 
-static double rms_of(const float *a, const float *b, size_t count) {
-    double sum = 0.0;
-    for (size_t i = 0; i < count; ++i) {
-        sum += ((double)a[i] - (double)b[i]) * ((double)a[i] - (double)b[i]);
-    }
-    return sqrt(sum / (double)count);
-}
-
 TEST(traced_values_are_near_those_of_marched_rays) {
     enum { SIZE = 64, COUNT = SIZE * SIZE };
     static float shadow[3][COUNT], ao[3][COUNT];
@@ -233,10 +226,10 @@ TEST(traced_values_are_near_those_of_marched_rays) {
     assert_int_equal(truth_lights(truth_seeds(), COUNT, positions, up, truth_seeds_sun, truth_seeds_w,
                                   INFINITY, 256, truth),
                      0);
-    const double marched_off = rms_of(shadow[0], truth, COUNT), traced_off = rms_of(shadow[1], truth, COUNT);
-    assert_less(traced_off, 1.25 * marched_off);
-    const double shadow_off = rms_of(shadow[0], shadow[1], COUNT), ao_off = rms_of(ao[0], ao[1], COUNT);
-    assert_true(shadow_off < 0.015 && ao_off < 0.01); /* shadow: casters are grown by 0.15 voxels */
+    assert_less(truth_compare(COUNT, shadow[1], truth, NULL).rmse,
+                1.25 * truth_compare(COUNT, shadow[0], truth, NULL).rmse);
+    assert_less(truth_compare(COUNT, shadow[0], shadow[1], NULL).rmse, 0.015); /* 0.15 voxels are added */
+    assert_less(truth_compare(COUNT, ao[0], ao[1], NULL).rmse, 0.01);
     assert_memory_equal(shadow[1], shadow[2], sizeof shadow[1]);
     assert_memory_equal(ao[1], ao[2], sizeof ao[1]);
 }

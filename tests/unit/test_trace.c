@@ -1,8 +1,9 @@
-/* Rays against triangles and against procedural solids: closed forms, the same scene elsewhere and in another
- * size, bad input. */
+/* Rays against triangles and against procedural solids: closed forms, moved and far scenes, bad input.
+ * test_relations.c scales scenes. */
 #include "rays.h"
 #include "shading.h"
 #include "testing.h"
+#include "texels_of.h"
 
 #include "trace/trace.h"
 #include "truth/directions.h"
@@ -64,31 +65,12 @@ static casters plate(float edge, float height) {
     return casters_of_mesh(&mesh, 1);
 }
 
-/* A ball of radius 1, of latitudes and longitudes. */
-static vsh_mesh ball(double x, double y, double z) {
-    enum { RINGS = 128, SECTORS = 256 };
-    static float positions[3 * (RINGS + 1) * SECTORS];
-    static uint32_t indices[6 * RINGS * SECTORS];
-    const double centre[3] = {x, y, z};
-    for (size_t v = 0; v < (RINGS + 1) * SECTORS; ++v) {
-        double d[3];
-        direction_at(PI * ((double)(v / SECTORS) / RINGS - 0.5), 2.0 * PI * (double)(v % SECTORS) / SECTORS,
-                     d);
-        for (size_t axis = 0; axis < 3; ++axis) {
-            positions[3 * v + axis] = (float)(centre[axis] + d[axis]);
-        }
-    }
-    for (uint32_t a = 0; a < RINGS * SECTORS; ++a) {
-        const uint32_t b = a / SECTORS * SECTORS + (a + 1) % SECTORS;
-        const uint32_t corners[6] = {a, b, a + SECTORS, b, b + SECTORS, a + SECTORS};
-        memcpy(indices + 6 * a, corners, sizeof corners);
-    }
-    return mesh_of_arrays(NULL, positions, NULL, (RINGS + 1) * SECTORS, indices, 2 * RINGS * SECTORS);
-}
-
+/* A ball of radius 1. */
 static casters casters_of_ball(double x, double y, double z) {
-    const vsh_mesh mesh = ball(x, y, z);
-    return casters_of_mesh(&mesh, 1);
+    FREED_BY(free_sphere) sphere ball;
+    make_sphere(&ball, 128, 1.0);
+    ball.mesh.transform = (const double[12]){1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z};
+    return casters_of_mesh(&ball.mesh, 1);
 }
 
 static vsh_sdf_node shape_at(int32_t shape, double x, double y, double z) {
@@ -151,8 +133,8 @@ TEST(a_hole_in_a_slab_lets_its_share_of_the_disc_through) {
 }
 
 TEST(ambient_occlusion_of_a_sphere_is_its_share_of_the_cosine) {
-    const vsh_sdf_node sphere = shape_at(VSH_SDF_SPHERE, 0.0, 2.0, 0.0);
-    casters both[2] = {casters_of_ball(0.0, 2.0, 0.0), casters_of_tree(&sphere, 1, NULL)};
+    const vsh_sdf_node node = shape_at(VSH_SDF_SPHERE, 0.0, 2.0, 0.0);
+    casters both[2] = {casters_of_ball(0.0, 2.0, 0.0), casters_of_tree(&node, 1, NULL)};
     for (int k = 0; k < 2; ++k) {
         /* a cap of half angle 30° around the normal holds sin² of it */
         assert_near(open_at(both[k], ORIGIN, 10.0, 8192), 0.75, 0.003);
@@ -163,26 +145,6 @@ TEST(ambient_occlusion_of_a_sphere_is_its_share_of_the_cosine) {
     }
 }
 
-/* The seeds' scene as trees of one shape each. */
-static casters seeds(void) {
-    vsh_sdf_node nodes[5] = {shape_at(VSH_SDF_PLANE, 0.0, 0.0, 0.0), shape_at(VSH_SDF_SPHERE, 0.0, 0.8, 0.0),
-                             box_at(-1.2, 0.7, 0.5, 0.3, 0.3, 0.3), shape_at(VSH_SDF_TORUS, 1.2, 0.6, -0.3),
-                             box_at(0.3, 1.0, 1.5, 0.05, 1.0, 0.05)};
-    nodes[0].size[0] = nodes[0].size[2] = 3.0;
-    nodes[0].size[1] = 0.5;
-    nodes[1].radius = 0.5;
-    nodes[2].rounding = 0.05;
-    nodes[3].radius = 0.4;
-    nodes[3].minor_radius = 0.08;
-    vsh_sdf sdfs[5];
-    for (size_t i = 0; i < 5; ++i) {
-        sdfs[i] = (vsh_sdf){&nodes[i], 1};
-    }
-    casters c = {NULL, NULL};
-    assert_ok(vshi_solids_create(sdfs, NULL, 5, &c.solids, &failure));
-    return c;
-}
-
 enum { SIZE = 64, COUNT = SIZE * SIZE };
 static double positions[3 * COUNT];
 static float normals[3 * COUNT], first[COUNT];
@@ -191,7 +153,9 @@ TEST(every_floor_texel_matches_analytic_rays) {
     enum { RAYS = 128 };
     static float truth[COUNT];
     floor_texels(SIZE, positions, normals);
-    FREED_BY(free_casters) casters c = seeds();
+    vsh_sdf_node nodes[2 * MAX_SOLIDS];
+    const vsh_sdf tree = tree_of_moved(truth_seeds(), 1.0, ORIGIN, nodes);
+    FREED_BY(free_casters) casters c = casters_of_tree(nodes, tree.node_count, NULL);
     vsh_light light = sun(truth_seeds_sun, 2.0 * atan(truth_seeds_w));
     see_light(NULL, c.solids, COUNT, positions, normals, 0.0, &light, RAYS, first);
     truth_lights(truth_seeds(), COUNT, positions, NULL, truth_seeds_sun, truth_seeds_w, INFINITY, RAYS,
@@ -246,21 +210,20 @@ TEST(a_ray_is_hidden_that_meets_either_solids_or_triangles) {
     free_casters(&both);
 }
 
-/* --- the same elsewhere, and in another size */
+/* --- the same elsewhere, and from far away */
 
-static casters box_and(int32_t shape, int32_t how, const double *transform) {
-    vsh_sdf_node nodes[3] = {box_at(0.3, 2.0, 0.1, 0.5, 0.2, 0.4), shape_at(shape, -0.5, 2.5, 0.3),
-                             operation_node(how, 0, 1)};
+static casters box_and_torus(const double *transform) {
+    vsh_sdf_node nodes[3] = {box_at(0.3, 2.0, 0.1, 0.5, 0.2, 0.4), shape_at(VSH_SDF_TORUS, -0.5, 2.5, 0.3),
+                             operation_node(VSH_SDF_SMOOTH_UNION, 0, 1)};
     nodes[2].smoothing = 0.3;
-    nodes[2].rotation[1] = how == VSH_SDF_UNION ? 0.5 : 0.0;
     return casters_of_tree(nodes, 3, transform);
 }
 
 TEST(transforms_move_solids) {
     /* mirrored in x, turned by a right angle about y, four times as large, and far away */
     const double m[12] = {0.0, 0.0, 4.0, 1000.0, 0.0, 4.0, 0.0, -200.0, 4.0, 0.0, 0.0, 30.0};
-    FREED_BY(free_casters) casters plain = box_and(VSH_SDF_TORUS, VSH_SDF_SMOOTH_UNION, NULL);
-    FREED_BY(free_casters) casters moved = box_and(VSH_SDF_TORUS, VSH_SDF_SMOOTH_UNION, m);
+    FREED_BY(free_casters) casters plain = box_and_torus(NULL);
+    FREED_BY(free_casters) casters moved = box_and_torus(m);
     const double towards[3] = {0.2, 1.0, 0.1}, turned[3] = {0.1, 1.0, 0.2};
     const vsh_light here = sun(towards, 0.3), there = sun(turned, 0.3);
     int between_both = 0;
@@ -273,46 +236,6 @@ TEST(transforms_move_solids) {
         between_both += value > 0.02 && value < 0.98;
     }
     assert_in_range(between_both, 20, 200);
-}
-
-enum { PLACES = 64 };
-
-/* A ball of triangles, or a cone beside a box, scaled and moved; values of a square of points below it. */
-static void scene_values(bool solid, double scale, double shift, double values[PLACES]) {
-    const double m[12] = {scale, 0.0, 0.0, shift, 0.0, scale, 0.0, shift, 0.0, 0.0, scale, shift};
-    vsh_mesh mesh = ball(0.25, 3.0, 0.125);
-    mesh.transform = m;
-    FREED_BY(free_casters)
-    casters c = solid ? box_and(VSH_SDF_CONE, VSH_SDF_UNION, m) : casters_of_mesh(&mesh, 1);
-    const vsh_light light = sun((const double[]){0.25, 1.0, 0.125}, 0.4);
-    for (int i = 0; i < PLACES; ++i) {
-        const double point[3] = {scale * (-1.5 + 0.4 * (i % 8)) + shift, shift,
-                                 scale * (-1.5 + 0.4 * (i / 8)) + shift};
-        values[i] = seen(c, point, UP, &light, 256);
-    }
-}
-
-TEST(scaled_scenes_keep_every_bit_and_far_ones_their_values) {
-    const double scales[] = {0x1p-100, 0x1p-20, 0x1p20, 0x1p100};
-    double here[PLACES], there[PLACES];
-    for (int solid = 0; solid < 2; ++solid) {
-        scene_values(solid, 1.0, 0.0, here);
-        int between_both = 0;
-        for (int i = 0; i < PLACES; ++i) {
-            between_both += here[i] > 0.0 && here[i] < 1.0;
-        }
-        assert_in_range(between_both, 10, PLACES);
-        for (size_t s = 0; s < COUNT_OF(scales); ++s) {
-            scene_values(solid, scales[s], 0.0, there);
-            assert_memory_equal(here, there, sizeof here);
-        }
-        if (!solid) {
-            scene_values(solid, 1.0, 0x1p24, there); /* 16.7 million units away */
-            for (int i = 0; i < PLACES; ++i) {
-                assert_near(there[i], here[i], 0.01);
-            }
-        }
-    }
 }
 
 /* A box of half side 1, scaled, seen from `distance` half sides away: straight below it, beside that, and
@@ -369,14 +292,15 @@ static int32_t note_thread(void *user, const char *stage, double fraction) {
 }
 
 /* A tree is made by many threads, or by the caller's alone. */
-TEST(trees_are_made_by_the_threads_that_were_given) {
-    const vsh_mesh mesh = ball(0.0, 0.0, 0.0);
+TEST(trees_are_built_on_the_requested_threads_only) {
+    FREED_BY(free_sphere) sphere ball;
+    make_sphere(&ball, 128, 1.0);
     for (int i = 0; i < 5; ++i) {
         witness w = {pthread_self(), 0, 0};
         vsh_run run = run_watched(note_thread, &w);
         run.threads = 1;
         vshi_triangles *triangles = NULL;
-        assert_ok(vshi_triangles_create(&mesh, 1, NULL, &run, &triangles, &failure));
+        assert_ok(vshi_triangles_create(&ball.mesh, 1, NULL, &run, &triangles, &failure));
         vshi_triangles_free(triangles);
         assert_true(w.calls > 2); /* from within the making too */
         assert_int_equal(w.others, 0);
@@ -405,7 +329,7 @@ TEST(packets_change_no_bit) {
 
 /* --- bad input */
 
-TEST(points_that_are_no_points_are_nan_and_no_casters_hide_nothing) {
+TEST(invalid_points_are_nan_and_no_casters_hide_nothing) {
     casters none[2] = {casters_of_mesh(NULL, 0), {NULL, NULL}};
     assert_ok(vshi_solids_create(NULL, NULL, 0, &none[1].solids, &failure));
     const double nowhere[3] = {NAN, 0.0, 0.0};
@@ -423,10 +347,11 @@ TEST(points_that_are_no_points_are_nan_and_no_casters_hide_nothing) {
 }
 
 TEST(bad_triangles_are_refused) {
-    const vsh_mesh mesh = ball(0.0, 0.0, 0.0);
+    FREED_BY(free_sphere) sphere ball;
+    make_sphere(&ball, 128, 1.0);
     vshi_triangles *triangles = NULL;
     const vsh_run small = run_within(1 << 20);
-    assert_fails(vshi_triangles_create(&mesh, 1, NULL, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vshi_triangles_create(&ball.mesh, 1, NULL, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
     const uint32_t wrong[3] = {0, 1, 99};
     const float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const vsh_mesh bad = mesh_of_arrays(NULL, corners, NULL, 3, wrong, 1);
@@ -436,10 +361,10 @@ TEST(bad_triangles_are_refused) {
 
 TEST(bad_solids_are_refused) {
     const double uneven[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
-    vsh_sdf_node sphere = vsh_sdf_node_default();
-    const vsh_sdf sdf = {&sphere, 1};
+    vsh_sdf_node node = vsh_sdf_node_default();
+    const vsh_sdf sdf = {&node, 1};
     vshi_solids *solids = NULL;
     assert_fails(vshi_solids_create(&sdf, uneven, 1, &solids, &failure), VSH_ERROR_INPUT, "unevenly");
-    sphere.radius = -1.0;
+    node.radius = -1.0;
     assert_fails(vshi_solids_create(&sdf, NULL, 1, &solids, &failure), VSH_ERROR_INPUT, "radius");
 }

@@ -567,15 +567,11 @@ TEST(bad_boxes_bands_and_options_are_refused) {
 
 /* --- dense copies of grids in files, as OpenVDB reads them back */
 
-/* A level set of a ball, written as `surface`: its distances are known. */
-static void write_ball(double voxel) {
-    OWNED(vsh_grid) *grid = grid_of(ball(), voxel);
-    assert_ok(vsh_grid_write(grid, vdb_path, NULL, NULL, 0, &failure));
-}
-
+/* Comparisons of .vdb files copy grids. */
 TEST(copied_distances_of_a_ball_are_exact_and_active_within_the_band) {
     const double voxel = 0.125, half = 3.0 * voxel;
-    write_ball(voxel);
+    OWNED(vsh_grid) *grid = grid_of(ball(), voxel);
+    assert_ok(vsh_grid_write(grid, vdb_path, NULL, NULL, 0, &failure));
     const int32_t low[3] = {-12, -11, -13}, size[3] = {25, 21, 27}; /* not the same along any two axes */
     const size_t count = (size_t)size[0] * (size_t)size[1] * (size_t)size[2];
     FREED float *values = malloc(count * sizeof *values), *active = malloc(count * sizeof *active);
@@ -600,29 +596,6 @@ TEST(copied_distances_of_a_ball_are_exact_and_active_within_the_band) {
     assert_true(fabs((double)one) < 0.02 * voxel);
     assert_ok(vshi_vdb_copy(vdb_path, NULL, middle, single, NULL, NULL, &one, &failure));
     assert_true(one == 1.0f);
-}
-
-TEST(bad_copies_are_refused) {
-    write_ball(0.25);
-    static const struct {
-        const char *path, *grid; /* NULL: the ball's */
-        int32_t low[3], size[3];
-        uint64_t memory_limit;
-        vsh_result code;
-        const char *part;
-    } cases[] = {{NULL, NULL, {0, 0, 0}, {1, 0, 1}, 0, VSH_ERROR_ARGUMENT, "along y"},
-                 {NULL, NULL, {0, 0, 0}, {65536, 65536, 2}, 0, VSH_ERROR_ARGUMENT, ""},
-                 {NULL, NULL, {INT32_MAX, 0, 0}, {2, 1, 1}, 0, VSH_ERROR_ARGUMENT, ""},
-                 {NULL, "density", {0, 0, 0}, {1, 1, 1}, 0, VSH_ERROR_INPUT, "density"},
-                 {"no/such.vdb", NULL, {0, 0, 0}, {1, 1, 1}, 0, VSH_ERROR_READ, ""},
-                 {NULL, NULL, {0, 0, 0}, {1, 1, 1}, 1000, VSH_ERROR_LIMIT, ""}};
-    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
-        const vsh_run run = run_within(cases[i].memory_limit);
-        float value;
-        assert_fails(vshi_vdb_copy(cases[i].path != NULL ? cases[i].path : vdb_path, cases[i].grid,
-                                   cases[i].low, cases[i].size, &run, &value, NULL, &failure),
-                     cases[i].code, cases[i].part);
-    }
 }
 
 FIXTURE(make_file, remove_file)
