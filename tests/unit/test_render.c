@@ -262,8 +262,7 @@ TEST(a_camera_inside_a_solid_sees_out) {
 TEST(options_out_of_range_and_limits_are_refused) {
     OWNED(vsh_field) *field = ball(0.0, 0.0, 0.0, 1.0, 0.1);
     const vsh_occluders *casters = occluders_of(field);
-    const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}},
-                      none = {NULL, {0.5, 0.5, 0.5}};
+    const vsh_surface surface = {field, {0.5, 0.5, 0.5}}, bright = {field, {0.5, 1.5, 0.5}};
     const vsh_render_options good = small(camera_at(0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 30.0), 4);
     vsh_render_options bad[8] = {good, good, good, good, good, good, good, good};
     static const char *const parts[] = {"width", "height",     "samples",     "shafts",
@@ -282,8 +281,6 @@ TEST(options_out_of_range_and_limits_are_refused) {
                      VSH_ERROR_ARGUMENT, parts[i]);
     }
     assert_fails(vsh_render(&bright, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
-                 VSH_ERROR_ARGUMENT, "");
-    assert_fails(vsh_render(&none, 1, casters, NULL, 0, &good, NULL, &picture, NULL, &failure),
                  VSH_ERROR_ARGUMENT, "");
     const vsh_run run = run_within(100000);
     assert_fails(vsh_render(&surface, 1, casters, NULL, 0, &good, &run, &picture, NULL, &failure),

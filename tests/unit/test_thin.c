@@ -221,15 +221,6 @@ TEST(walls_beside_a_receiver_shade_it) {
 
 /* --- solids that touch, lie in each other or share faces */
 
-static casting caster_of_boxes(const double (*corners)[2][3], int count, double voxel) {
-    float places[4][24];
-    vsh_mesh meshes[4];
-    for (int i = 0; i < count; ++i) {
-        meshes[i] = box_mesh(places[i], corners[i][0], corners[i][1]);
-    }
-    return caster_of_meshes(meshes, (size_t)count, voxel, 0.0);
-}
-
 /* The lightest value in the umbra of the boxes, straight under them. */
 static double lightest_umbra(const casting *c, double angle, double depth, double x, int32_t method) {
     const double up[3] = {0.0, 1.0, 0.0};
@@ -268,7 +259,7 @@ static void shade_row(const casting *c, row *r) {
 TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
     const struct {
         const char *what;
-        int count;
+        size_t count;
         double corners[3][2][3];
     } cases[] = {
         {"one box", 1, {{{-1, -1, -1}, {1, 1, 1}}}},
@@ -289,7 +280,12 @@ TEST(meshes_that_touch_nest_or_coincide_are_one_solid) {
     };
     static row one, other;
     for (size_t c = 0; c < COUNT_OF(cases); ++c) {
-        FREED_BY(caster_free) casting made = caster_of_boxes(cases[c].corners, cases[c].count, VOXEL);
+        float places[3][24];
+        vsh_mesh meshes[3];
+        for (size_t i = 0; i < cases[c].count; ++i) {
+            meshes[i] = box_mesh(places[i], cases[c].corners[i][0], cases[c].corners[i][1]);
+        }
+        FREED_BY(caster_free) casting made = caster_of_meshes(meshes, cases[c].count, VOXEL, 0.0);
         /* signs are those of the union */
         const truth_solid box = {TRUTH_BOX, {0, 0, 0}, {1, 1, 1}, 0.0, 0.0};
         uint64_t counter = 1;
