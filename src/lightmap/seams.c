@@ -18,6 +18,17 @@
  * chart of each texel. Places that would read a third chart are left out. The rest falls into islands that
  * have no texel in common. */
 
+enum { READS = 8 }; /* texels: four on each side */
+
+/* A place on a seam. Σ weight × texel is the difference between the bilinear lookups on both sides. Weights
+ * are multiples of 2^-24 with the sum 0, so equal texels give exactly 0. `share` weighs the squared
+ * difference by its length of border, in half texels, so that short edges count like long ones. */
+typedef struct seam_row {
+    uint32_t unknown[READS];
+    float weight[READS];
+    float share;
+} seam_row;
+
 /* The texels that seams read are the unknowns, numbered island by island. No row reads texels of two islands.
  */
 typedef struct seam_system {
@@ -26,8 +37,8 @@ typedef struct seam_system {
     uint32_t *page;  /* [unknown_count] */
     uint32_t *chart; /* [unknown_count]: the chart that covers it; NO_CHART: none */
     size_t row_count;
-    vshi_seam_row *rows; /* [row_count], island by island */
-    double shares;       /* of all rows */
+    seam_row *rows; /* [row_count], island by island */
+    double shares;  /* of all rows */
     size_t island_count;
     uint32_t *first_unknown; /* these two [island_count + 1] */
     uint32_t *first_row;
@@ -56,10 +67,10 @@ typedef struct making {
     uint64_t *marks; /* [words]: of texels, in the order of the image */
     uint32_t *rank;  /* [words]: texels marked before a word */
     size_t words;
-    uint32_t *parent;        /* [unknowns]: union-find, then the island */
-    uint32_t *number;        /* [unknowns]: island by island */
-    vshi_seam_row *unsorted; /* [places] */
-    size_t page;             /* whose owners are found */
+    uint32_t *parent;   /* [unknowns]: union-find, then the island */
+    uint32_t *number;   /* [unknowns]: island by island */
+    seam_row *unsorted; /* [places] */
+    size_t page;        /* whose owners are found */
 } making;
 
 /* Texels that a lookup reads, and their weights in 2^-24. */
@@ -207,8 +218,7 @@ static void place_unknowns(const making *m) {
 
 /* Sets one side of a row. The weight of a texel that another chart covers, if it is hardly read, goes to the
  * texel with the most weight. */
-static bool set_side(const making *m, const lookup *found, const uint32_t chart[2], int side,
-                     vshi_seam_row *row) {
+static bool set_side(const making *m, const lookup *found, const uint32_t chart[2], int side, seam_row *row) {
     float weight[4];
     int most = 0;
     for (int k = 0; k < 4; ++k) {
@@ -253,7 +263,7 @@ static vsh_result make_rows(making *m, vsh_error *error) {
         const size_t places = places_of(seam, &share);
         for (size_t p = 0; p < places; ++p) {
             const lookup a = find_lookup(m, seam, 0, p, places), b = find_lookup(m, seam, 1, p, places);
-            vshi_seam_row *row = &m->unsorted[system->row_count];
+            seam_row *row = &m->unsorted[system->row_count];
             if (!set_side(m, &a, seam->chart, 0, row) || !set_side(m, &b, seam->chart, 1, row)) {
                 ++system->crowded;
                 continue;
@@ -261,7 +271,7 @@ static vsh_result make_rows(making *m, vsh_error *error) {
             /* ends are those of the next edge too */
             row->share = places > 1 && (p == 0 || p + 1 == places) ? 0.5f * share : share;
             system->shares += (double)row->share;
-            for (int k = 1; k < VSHI_SEAM_READS; ++k) {
+            for (int k = 1; k < READS; ++k) {
                 vshi_set_join(m->parent, row->unknown[0], row->unknown[k]);
             }
             ++system->row_count;
@@ -306,10 +316,10 @@ static vsh_result sort_islands(making *m, vsh_error *error) {
         m->number[u] = unknowns[m->parent[u]]++;
     }
     for (size_t r = 0; r < s->row_count; ++r) {
-        const vshi_seam_row *from = &m->unsorted[r];
-        vshi_seam_row *to = &s->rows[rows[m->parent[from->unknown[0]]]++];
+        const seam_row *from = &m->unsorted[r];
+        seam_row *to = &s->rows[rows[m->parent[from->unknown[0]]]++];
         *to = *from;
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        for (int k = 0; k < READS; ++k) {
             to->unknown[k] = m->number[from->unknown[k]];
         }
     }
@@ -396,34 +406,51 @@ static void free_making(making *m) {
  * 1/1000 of the largest. */
 static const double TOLERANCE = 1e-5;
 
+/* An island's unknowns in one channel: the changes of texels that minimise the differences at seams. */
+typedef struct seam_problem {
+    const seam_row *rows;
+    size_t row_count, unknown_count;
+    uint32_t first;         /* number of its first unknown in the rows */
+    const double *low;      /* [unknown_count]: ≤ 0, the least change of each */
+    const double *high;     /* ≥ 0 */
+    const double *keep;     /* > 0: the cost of a squared change */
+    const double *gradient; /* at no change */
+    double *change;         /* found */
+    double *work;           /* [WORK × unknown_count] */
+    vshi_job *job;          /* checked for cancelling */
+} seam_problem;
+
+enum { WORK = 2 }; /* vectors */
+
 enum { MOST_STEPS = 1000 }; /* some 200 are taken */
 
-void vshi_seam_gradient(const vshi_seam_problem *p, const double *values, double *gradient) {
+/* Computes the gradient of ½ Σ share (row · values)². */
+static void find_gradient(const seam_problem *p, const double *values, double *gradient) {
     for (size_t u = 0; u < p->unknown_count; ++u) {
         gradient[u] = 0.0;
     }
     for (size_t r = 0; r < p->row_count; ++r) {
-        const vshi_seam_row *row = &p->rows[r];
+        const seam_row *row = &p->rows[r];
         double difference = 0.0;
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        for (int k = 0; k < READS; ++k) {
             difference += (double)row->weight[k] * values[row->unknown[k] - p->first];
         }
         difference *= (double)row->share;
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        for (int k = 0; k < READS; ++k) {
             gradient[row->unknown[k] - p->first] += (double)row->weight[k] * difference;
         }
     }
 }
 
 /* An upper bound of the curvature: the largest sum of a column times that of a row, which is at most 2. */
-static double largest_curvature(const vshi_seam_problem *p, double *column) {
+static double largest_curvature(const seam_problem *p, double *column) {
     double most = 0.0;
     for (size_t u = 0; u < p->unknown_count; ++u) {
         column[u] = 0.0;
     }
     for (size_t r = 0; r < p->row_count; ++r) {
-        const vshi_seam_row *row = &p->rows[r];
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        const seam_row *row = &p->rows[r];
+        for (int k = 0; k < READS; ++k) {
             column[row->unknown[k] - p->first] += (double)row->share * fabs((double)row->weight[k]);
         }
     }
@@ -433,7 +460,9 @@ static double largest_curvature(const vshi_seam_problem *p, double *column) {
     return most;
 }
 
-int vshi_seam_solve(vshi_seam_problem *p) {
+/* Minimises ½ Σ share (row · (value + change))² + ½ Σ keep change² within low … high. All machines give the
+ * same bits. */
+static void solve(const seam_problem *p) {
     const size_t count = p->unknown_count;
     double *gradient = p->work, *ahead = gradient + count; /* where the gradient is taken */
     const double step = 1.0 / largest_curvature(p, gradient);
@@ -443,10 +472,9 @@ int vshi_seam_solve(vshi_seam_problem *p) {
         enough += p->gradient[u] * p->gradient[u];
     }
     enough *= TOLERANCE * TOLERANCE * step * step;
-    int i = 0;
-    for (; i < MOST_STEPS && !vshi_job_advance(p->job, 0); ++i) {
+    for (int i = 0; i < MOST_STEPS && !vshi_job_advance(p->job, 0); ++i) {
         double moved = 0.0, back = 0.0;
-        vshi_seam_gradient(p, ahead, gradient);
+        find_gradient(p, ahead, gradient);
         for (size_t u = 0; u < count; ++u) { /* the next change, for now in `gradient` */
             const double slope = p->gradient[u] + gradient[u] + p->keep[u] * ahead[u];
             gradient[u] = fmin(fmax(ahead[u] - step * slope, p->low[u]), p->high[u]);
@@ -465,7 +493,6 @@ int vshi_seam_solve(vshi_seam_problem *p) {
             break;
         }
     }
-    return i;
 }
 
 /* --- islands and channels */
@@ -474,7 +501,7 @@ int vshi_seam_solve(vshi_seam_problem *p) {
  * does not run away where it is hardly read. */
 static const double GUESS = 0.1;
 
-enum { VECTORS = 5 + VSHI_SEAM_WORK }; /* low, high, keep, gradient, change */
+enum { VECTORS = 5 + WORK }; /* low, high, keep, gradient, change */
 
 /* Sums over an island's rows. */
 typedef struct island {
@@ -517,17 +544,17 @@ static bool is_guess(const stitching *s, size_t unknown) {
 }
 
 /* The largest value that is read together with each unknown. */
-static void find_largest(const vshi_seam_problem *p, const double *values, double *largest) {
+static void find_largest(const seam_problem *p, const double *values, double *largest) {
     for (size_t u = 0; u < p->unknown_count; ++u) {
         largest[u] = 0.0;
     }
     for (size_t r = 0; r < p->row_count; ++r) {
         const uint32_t *unknown = p->rows[r].unknown;
         double most = 0.0;
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        for (int k = 0; k < READS; ++k) {
             most = fmax(most, values[unknown[k] - p->first]);
         }
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        for (int k = 0; k < READS; ++k) {
             largest[unknown[k] - p->first] = fmax(largest[unknown[k] - p->first], most);
         }
     }
@@ -554,11 +581,11 @@ static float moved(float value, double change, double low, double high) {
     return to;
 }
 
-static double square_of(const vshi_seam_problem *p, const double *values) {
+static double square_of(const seam_problem *p, const double *values) {
     double sum = 0.0;
     for (size_t r = 0; r < p->row_count; ++r) {
         double difference = 0.0;
-        for (int k = 0; k < VSHI_SEAM_READS; ++k) {
+        for (int k = 0; k < READS; ++k) {
             difference += (double)p->rows[r].weight[k] * values[p->rows[r].unknown[k] - p->first];
         }
         sum += (double)p->rows[r].share * difference * difference;
@@ -573,17 +600,17 @@ static void stitch_island(const stitching *s, const channel *c, size_t i) {
     const size_t all = system->unknown_count;
     double *low = c->vectors + first, *high = low + all, *keep = high + all, *gradient = keep + all,
            *values = gradient + all;
-    vshi_seam_problem p = {.rows = system->rows + system->first_row[i],
-                           .row_count = system->first_row[i + 1] - system->first_row[i],
-                           .unknown_count = count,
-                           .first = (uint32_t)first,
-                           .low = low,
-                           .high = high,
-                           .keep = keep,
-                           .gradient = gradient,
-                           .change = values,
-                           .work = c->vectors + (VECTORS - VSHI_SEAM_WORK) * all + VSHI_SEAM_WORK * first,
-                           .job = s->job};
+    seam_problem p = {.rows = system->rows + system->first_row[i],
+                      .row_count = system->first_row[i + 1] - system->first_row[i],
+                      .unknown_count = count,
+                      .first = (uint32_t)first,
+                      .low = low,
+                      .high = high,
+                      .keep = keep,
+                      .gradient = gradient,
+                      .change = values,
+                      .work = c->vectors + (VECTORS - WORK) * all + WORK * first,
+                      .job = s->job};
     island *sums = &c->islands[i];
     *sums = (island){0.0, 0.0, 0.0};
     bool finite = true;
@@ -601,8 +628,8 @@ static void stitch_island(const stitching *s, const channel *c, size_t i) {
         keep[u] = s->options->keep * (is_guess(s, first + u) ? GUESS : 1.0);
     }
     sums->before = square_of(&p, values);
-    vshi_seam_gradient(&p, values, gradient);
-    vshi_seam_solve(&p);
+    find_gradient(&p, values, gradient);
+    solve(&p);
     for (size_t u = 0; u < count; ++u) {
         float *value = value_of(s, c, first + u);
         *value = moved(*value, p.change[u], low[u], high[u]);

@@ -33,37 +33,3 @@ typedef struct vshi_seams {
 vsh_result vshi_seams_find(const vshi_seam_pages *pages, double cosine, const vsh_run *run, vshi_job *job,
                            vshi_seams *seams, vsh_error *error);
 void vshi_seams_free(vshi_seams *seams);
-
-enum { VSHI_SEAM_READS = 8 }; /* texels: four on each side */
-
-/* A place on a seam. Σ weight × texel is the difference between the bilinear lookups on both sides. Weights
- * are multiples of 2^-24 with the sum 0, so equal texels give exactly 0. `share` weighs the squared
- * difference by its length of border, in half texels, so that short edges count like long ones. */
-typedef struct vshi_seam_row {
-    uint32_t unknown[VSHI_SEAM_READS];
-    float weight[VSHI_SEAM_READS];
-    float share;
-} vshi_seam_row;
-
-/* An island's unknowns in one channel: the changes of texels that minimise the differences at seams. */
-typedef struct vshi_seam_problem {
-    const vshi_seam_row *rows;
-    size_t row_count, unknown_count;
-    uint32_t first;         /* number of its first unknown in the rows */
-    const double *low;      /* [unknown_count]: ≤ 0, the least change of each */
-    const double *high;     /* ≥ 0 */
-    const double *keep;     /* > 0: the cost of a squared change */
-    const double *gradient; /* at no change */
-    double *change;         /* found */
-    double *work;           /* [VSHI_SEAM_WORK × unknown_count] */
-    vshi_job *job;          /* checked for cancelling */
-} vshi_seam_problem;
-
-enum { VSHI_SEAM_WORK = 2 }; /* vectors */
-
-/* Computes the gradient of ½ Σ share (row · values)². */
-void vshi_seam_gradient(const vshi_seam_problem *problem, const double *values, double *gradient);
-
-/* Minimises ½ Σ share (row · (value + change))² + ½ Σ keep change² within low … high. All machines give the
- * same bits. Returns the number of steps. */
-int vshi_seam_solve(vshi_seam_problem *problem);
