@@ -155,9 +155,9 @@ vsh_result vshi_patch_overlaps(const vshi_patch *patch, bool *overlaps, vsh_erro
 /* --- charts of the UVs that a mesh has (uvs.c) */
 
 /* Checks whether the UVs of a surface that was cut by them are usable: they lie in the unit square, all
- * triangles that have area have area in them and run the same way, and no two overlap. If they are and
- * `patches` is not NULL, adds a patch for each connected part. All are scaled alike, so that together they
- * have the surface's area. Errors: VSH_ERROR_MEMORY. */
+ * triangles that have area have area in them and run the same way, and no two overlap. If they are, adds a
+ * patch for each connected part. All are scaled alike, so that together they have the surface's area.
+ * Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_keep_charts(const vshi_cut_mesh *surface, vshi_patches *patches, bool *usable,
                             vsh_error *error);
 

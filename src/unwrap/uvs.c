@@ -129,7 +129,7 @@ vsh_result vshi_keep_charts(const vshi_cut_mesh *s, vshi_patches *patches, bool 
     whole.kept = true; /* it has many parts, each with a border of its own */
     VSHI_TRY_DONE(vshi_patch_overlaps(&whole, &overlaps, error));
     *usable = !overlaps;
-    if (*usable && patches != NULL) {
+    if (*usable) {
         VSHI_TRY_DONE(add_parts(&whole, senses < 0, patches, error));
     }
 done:

@@ -82,10 +82,6 @@ static inline texel_box box_of(const corner_uvs *c, const vsh_atlas_info *info) 
         b.x1 = (int)fmax(b.x1, ceil(c->at[k][0]));
         b.y1 = (int)fmax(b.y1, ceil(c->at[k][1]));
     }
-    b.x0 = b.x0 < 0 ? 0 : b.x0;
-    b.y0 = b.y0 < 0 ? 0 : b.y0;
-    b.x1 = b.x1 > info->width ? info->width : b.x1;
-    b.y1 = b.y1 > info->height ? info->height : b.y1;
     return b;
 }
 
@@ -131,16 +127,15 @@ static inline double stretch_of(const vsh_mesh *mesh, const corner_uvs *c, const
     *larger = sqrt(0.5 * (a + d + root));
     *smaller = sqrt(fmax(0.0, 0.5 * (a + d - root)));
     normal_of(p, n);
-    return sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    return length3(n);
 }
 
 static inline int is_flat(const vsh_mesh *mesh, size_t triangle) {
-    const uint32_t *v = mesh->indices + 3 * triangle;
+    vsh_mesh own = *mesh;
     double p[3][3], n[3];
-    for (int k = 0; k < 3; ++k) {
-        for (int i = 0; i < 3; ++i) {
-            p[k][i] = (double)mesh->positions[3 * (size_t)v[k] + (size_t)i];
-        }
+    own.transform = NULL;
+    for (size_t k = 0; k < 3; ++k) {
+        place_of(&own, mesh->indices[3 * triangle + k], p[k]);
     }
     normal_of(p, n);
     return n[0] == 0 && n[1] == 0 && n[2] == 0;
@@ -178,7 +173,7 @@ static inline void look_at_mesh(const vsh_mesh *mesh, size_t index, const vsh_at
             continue;
         }
         const uint32_t chart = m.charts[i];
-        assert_true(chart < atlas_info(atlas).charts);
+        assert_true(chart < info->charts);
         const vsh_atlas_chart view = vsh_atlas_charts(atlas)[chart];
         assert_int_equal(view.mesh, index);
         assert_true(view.page < info->pages);
@@ -244,11 +239,8 @@ static inline void look_at_padding(const vsh_atlas_info *info, int padding, cons
 /* Holds an atlas against all that it promises. */
 static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o,
                                  const vsh_atlas *atlas) {
-    vsh_atlas_info info;
-    vsh_atlas_get_info(atlas, &info);
-    assert_int_equal(atlas_info(atlas).meshes, count);
-    assert_int_equal(atlas_info(atlas).charts, info.charts);
-    assert_int_equal(atlas_info(atlas).pages, info.pages);
+    const vsh_atlas_info info = atlas_info(atlas);
+    assert_int_equal(info.meshes, count);
     assert_true(o->fit_pages ? info.width <= o->width && info.height <= o->height
                              : info.width == o->width && info.height == o->height);
     assert_true(info.pages <= (o->atlas == VSH_ATLAS_OBJECTS ? count : (size_t)o->max_pages));
@@ -300,10 +292,9 @@ static inline vsh_unwrap_options unwrap_into(int32_t size) {
 static inline vsh_atlas_info unwrap_well(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o,
                                          vsh_atlas **kept) {
     vsh_atlas *atlas = NULL;
-    vsh_atlas_info info;
     assert_ok(vsh_unwrap(meshes, count, o, NULL, &atlas, &failure));
     look_at_atlas(meshes, count, o, atlas);
-    vsh_atlas_get_info(atlas, &info);
+    const vsh_atlas_info info = atlas_info(atlas);
     if (kept != NULL) {
         *kept = atlas;
     } else {
