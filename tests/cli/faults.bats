@@ -79,10 +79,12 @@ BAKE=(bake box.obj "${SMALL[@]}" -o)
 
 @test "a folder that does not exist or cannot be written to, a folder in place of the output, endings, bits and packings that are none" {
     mkdir folder.exr
+    mkfifo pipe.png
     refuse_each "${BAKE[@]}" <<'LIST'
 3 none/out.exr | none/out.exr
 3 none/stats.json | out.exr --stats none/stats.json
 3 folder.exr | folder.exr
+3 pipe.png 'no regular file' | pipe.png
 2 out.xyz | out.xyz
 2 out | out
 2 32 | out.png --bits 32

@@ -41,11 +41,6 @@ void vshi_image_writer_abandon(vshi_image_writer *writer);
  * writes the format from memory only. 0 if vsh_image_check() fails. */
 uint64_t vshi_image_writer_bytes(const char *path, const vsh_image *image, const vsh_image_options *options);
 
-/* Writes the default packing as text: irradiance.R, .G and .B, or else the first three
- * channels that are not "A" to R, G, B (one alone: to R, G and B), "A" to A, which is left out where the
- * format has no alpha. Writes at most `capacity` bytes, NUL included. */
-void vshi_image_default_pack(const vsh_image *image, char *text, size_t capacity);
-
 /* --- image files in memory */
 
 /* The most values of an image: 8 GiB of floats. */

@@ -172,21 +172,13 @@ static vsh_result parse_pack(const char *text, const vsh_image *image, pack made
     }
 }
 
-void vshi_image_default_pack(const vsh_image *image, char *text, size_t capacity) {
-    if (text == NULL || capacity == 0) {
-        return;
-    }
-    text[0] = '\0';
-    if (image == NULL || image->names == NULL) {
-        return;
-    }
+/* Writes the default packing as text: irradiance.R, .G and .B, or else the first three channels that are not
+ * "A" to R, G, B (one alone: to R, G and B), "A" to A, which is left out where the format has no alpha. */
+static void write_default_pack(const vsh_image *image, char *text, size_t capacity) {
     const char *colors[3] = {NULL, NULL, NULL};
     const char *alpha = NULL;
     int count = 0;
     for (int32_t c = 0; c < image->channel_count; ++c) {
-        if (image->names[c] == NULL) {
-            continue;
-        }
         if (strcmp(image->names[c], "A") == 0) {
             alpha = image->names[c];
         } else if (count < 3) {
@@ -194,8 +186,7 @@ void vshi_image_default_pack(const vsh_image *image, char *text, size_t capacity
         }
     }
     picture found;
-    if (image->channel_count <= VSH_MAX_CHANNELS && find_picture(image, &found) && found.rgb[0] >= 0 &&
-        found.rgb[0] != found.rgb[1]) { /* irradiance */
+    if (find_picture(image, &found) && found.rgb[0] >= 0 && found.rgb[0] != found.rgb[1]) { /* irradiance */
         for (int c = 0; c < 3; ++c) {
             colors[c] = image->names[found.rgb[c]];
         }
@@ -385,7 +376,7 @@ static vsh_result plan_pack(const char *path, const vsh_image *image, const char
                             vsh_error *error) {
     char default_text[KEYS * (VSH_CHANNEL_NAME + 3)];
     pack made = {{0}};
-    vshi_image_default_pack(image, default_text, sizeof default_text);
+    write_default_pack(image, default_text, sizeof default_text);
     VSHI_TRY(parse_pack(text != NULL ? text : default_text, image, made, error));
     VSHI_TRY(fit_pack(path, &plan->format, text != NULL, made, error));
     for (int key = 0; key < KEYS; ++key) {
