@@ -250,8 +250,9 @@ solid() {
 @test "Alembic and USD files are refused by name" {
     printf '#usda 1.0\n' >set.usda
     printf 'Ogawa' >cache.abc
+    printf 'PXR-USDC' >crate.USDC
     local file
-    for file in set.usda cache.abc; do
+    for file in set.usda crate.USDC cache.abc; do
         refuses 2 "$file" 'which is not read' 'OBJ, glTF, GLB, PLY, STL, FBX or DAE' -- bake "$file" -o out.vdb.exr --ao 1
         refuses 2 "$file" 'which is not read' -- voxelize "$file" -o out.vdb
         refuses_caster 2 "{\"mesh\": \"$file\"}" "$file" 'which is not read'

@@ -102,28 +102,6 @@ static const char quad_fbx[] =
     "\tModel: 200, \"Model::quad\", \"Mesh\" {\n\t\tVersion: 232\n\t}\n}\n"
     "Connections:  {\n\tC: \"OO\",200,0\n\tC: \"OO\",100,200\n}\n";
 
-/* positions 48, first UVs 32, second UVs 32, indices 12 bytes */
-enum { BUFFER = 124 };
-
-static inline void quad_buffer(unsigned char bytes[BUFFER], const float *corner2, uint16_t last_index) {
-    float positions[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
-    float first[4][2], second[4][2];
-    const uint16_t indices[6] = {0, 1, 2, 0, 2, last_index};
-    if (corner2 != NULL) {
-        memcpy(positions[2], corner2, sizeof positions[2]);
-    }
-    for (int i = 0; i < 4; ++i) {
-        first[i][0] = quad_uv[i][0];
-        first[i][1] = 1.0F - quad_uv[i][1]; /* glTF's v points down */
-        second[i][0] = 0.5F * quad_uv[i][0];
-        second[i][1] = 1.0F - 0.5F * quad_uv[i][1];
-    }
-    memcpy(bytes, positions, 48);
-    memcpy(bytes + 48, first, 32);
-    memcpy(bytes + 80, second, 32);
-    memcpy(bytes + 112, indices, 12);
-}
-
 static inline void base64(const unsigned char *bytes, size_t size, char *text) {
     static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for (size_t i = 0; i < size; i += 3) {
@@ -138,69 +116,10 @@ static inline void base64(const unsigned char *bytes, size_t size, char *text) {
     *text = '\0';
 }
 
-static const char one_node[] = "{\"name\":\"here\",\"mesh\":0}";
-
-/* The root turns by 90° about z, doubles, and moves by (1, 2, 3); one child moves by (1, 0, 0), one mirrors
- * x. */
-static const char instances[] =
-    "{\"name\":\"root\",\"children\":[1,2],\"translation\":[1,2,3],\"scale\":[2,2,2],"
-    "\"rotation\":[0,0,0.70710678118654752,0.70710678118654752]},"
-    "{\"name\":\"moved\",\"mesh\":0,\"translation\":[1,0,0]},"
-    "{\"name\":\"mirrored\",\"mesh\":0,\"matrix\":[-1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]}";
-
-/* The JSON of the quad; `uri` is "" or "\"uri\":…," of the buffer. */
-static inline void quad_json(char json[4096], const char *nodes, const char *uri) {
-    const int size = snprintf(
-        json, 4096,
-        "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[%s],"
-        "\"meshes\":[{\"name\":\"quad\",\"primitives\":[{\"attributes\":{\"POSITION\":0,\"TEXCOORD_0\":1,"
-        "\"TEXCOORD_1\":2},\"indices\":3}]}],\"accessors\":["
-        "{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"},"
-        "{\"bufferView\":1,\"componentType\":5126,\"count\":4,\"type\":\"VEC2\"},"
-        "{\"bufferView\":2,\"componentType\":5126,\"count\":4,\"type\":\"VEC2\"},"
-        "{\"bufferView\":3,\"componentType\":5123,\"count\":6,\"type\":\"SCALAR\"}],\"bufferViews\":["
-        "{\"buffer\":0,\"byteOffset\":0,\"byteLength\":48},{\"buffer\":0,\"byteOffset\":48,\"byteLength\":32}"
-        ","
-        "{\"buffer\":0,\"byteOffset\":80,\"byteLength\":32},{\"buffer\":0,\"byteOffset\":112,\"byteLength\":"
-        "12}],"
-        "\"buffers\":[{%s\"byteLength\":%d}]}",
-        nodes, uri, BUFFER);
-    assert_in_range(size, 1, 4095);
-}
-
-static inline void quad_gltf(char json[4096], const char *nodes, const float *corner2, uint16_t last_index) {
-    unsigned char buffer[BUFFER];
-    char text[BUFFER * 2], uri[512];
-    quad_buffer(buffer, corner2, last_index);
-    base64(buffer, BUFFER, text);
-    snprintf(uri, sizeof uri, "\"uri\":\"data:application/octet-stream;base64,%s\",", text);
-    quad_json(json, nodes, uri);
-}
-
 static inline void put_u32(unsigned char *to, size_t value) {
     for (int i = 0; i < 4; ++i) {
         to[i] = (unsigned char)(value >> (8 * i));
     }
-}
-
-static inline size_t quad_glb(unsigned char bytes[8192]) {
-    char json[4096];
-    quad_json(json, one_node, "");
-    size_t size = strlen(json);
-    while (size % 4 != 0) {
-        json[size++] = ' ';
-    }
-    const size_t all = 20 + size + 8 + BUFFER;
-    memcpy(bytes, "glTF", 4);
-    put_u32(bytes + 4, 2);
-    put_u32(bytes + 8, all);
-    put_u32(bytes + 12, size);
-    memcpy(bytes + 16, "JSON", 4);
-    memcpy(bytes + 20, json, size);
-    put_u32(bytes + 20 + size, BUFFER);
-    memcpy(bytes + 24 + size, "BIN", 4);
-    quad_buffer(bytes + 28 + size, NULL, 3);
-    return all;
 }
 
 static inline size_t binary_stl(unsigned char *bytes, const float (*corners)[3], size_t triangles) {
