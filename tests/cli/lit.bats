@@ -227,6 +227,13 @@ JSON
     cmp lit.bin bin.before && cmp lit.occlusion.png png.before || fail 'a file of the input was replaced'
     grep -q '"uri": "lit.1.bin"' lit.gltf && grep -q '"uri": "lit.occlusion.1.png"' lit.gltf || fail "$(grep uri lit.gltf)"
     cmp lit.occlusion.1.png new.occlusion.png || fail 'another image'
+    # an image that is replaced is neither named, nor copied, nor missed
+    [ "$(grep -o '"uri": "[^"]*"' new.gltf | sort | tr '\n' ' ')" = '"uri": "new.bin" "uri": "new.occlusion.png" ' ] || fail "$(grep uri new.gltf)"
+    mkdir far
+    rm lit.occlusion.png
+    succeed bake in.gltf --ao 0.2 --size 32 -o far/new.gltf
+    [[ $stderr != *lit.occlusion.png* ]] || fail "$stderr"
+    [ "$(ls far | tr '\n' ' ')" = 'new.bin new.gltf new.occlusion.png ' ] || fail "$(ls far)"
 }
 
 @test "an asset says where it comes from, in its extras, as images do" {

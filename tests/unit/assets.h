@@ -1,6 +1,7 @@
 /* Assets that tests write themselves, and what stands in those that come back. */
 #pragma once
 
+#include "handles.h"
 #include "models.h"
 
 #include "base/text.h"
@@ -272,12 +273,6 @@ static inline void keep_file(const char *path) {
                  (int)getpid(), ++number, folder, kept);
         assert_int_equal(system(command), 0);
     }
-}
-
-static inline vsh_model *read_model(const char *path) {
-    vsh_model *model = NULL;
-    assert_ok(vsh_model_read(path, NULL, &model, &failure));
-    return model;
 }
 
 static inline void write_lit(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,

@@ -231,7 +231,7 @@ static inline lighting begin_lighting(asset in, bool split) {
     lighting l = {.in = in};
     write_glb(&in, "in.glb");
     write_all(at("tile one.png"), white_png, sizeof white_png);
-    l.model = read_model(at("in.glb"));
+    l.model = model_from(at("in.glb"));
     l.lit = make_all_lit(l.model, split);
     return l;
 }
