@@ -125,9 +125,20 @@ static vsh_result load(card c, vsh_assets **assets) {
     return result;
 }
 
+static int by_disc(double x, double z) {
+    const double off = hypot(x - CENTRE[0], z - CENTRE[1]) - RADIUS;
+    return fabs(off) < 3e-3 ? -1 : off < 0.0;
+}
+
+static int everywhere(double x, double z) {
+    return 1;
+}
+
 /* Rays upwards from all over the card: `expected` says which are blocked (1; -1: too near to an edge to say).
- * Frees the assets. */
-static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z)) {
+ */
+static void assert_casts(card c, int (*expected)(double x, double z)) {
+    OWNED(vsh_assets) *assets = NULL;
+    assert_ok(load(c, &assets));
     size_t count = 0;
     const vsh_mesh *meshes = vsh_assets_caster(assets, 0, &count);
     OWNED(vshi_triangles) *triangles = triangles_from(meshes, count);
@@ -143,22 +154,6 @@ static void expect_shadow(vsh_assets *assets, int (*expected)(double x, double z
         asked += is >= 0;
     }
     assert_true(asked > 5000 && met > 150);
-    vsh_assets_free(assets);
-}
-
-static int by_disc(double x, double z) {
-    const double off = hypot(x - CENTRE[0], z - CENTRE[1]) - RADIUS;
-    return fabs(off) < 3e-3 ? -1 : off < 0.0;
-}
-
-static int everywhere(double x, double z) {
-    return 1;
-}
-
-static void assert_casts(card c, int (*expected)(double x, double z)) {
-    vsh_assets *assets = NULL;
-    assert_ok(load(c, &assets));
-    expect_shadow(assets, expected);
 }
 
 TEST(a_card_casts_the_disc_in_its_textures_alpha) {

@@ -102,18 +102,6 @@ TEST(many_overlaps_leave_the_union) {
         const double distance = vshi_outline_distance(all, p);
         assert_int_equal(distance < 0.0, nearest < 0.0);
         assert_true(nearest < 0.0 ? distance <= nearest + 1e-12 : fabs(distance - nearest) < 1e-12);
-        /* the border is a border: just beside it are inside and outside */
-    }
-    size_t count;
-    const double *p;
-    for (size_t c = 0; (p = vshi_outline_contour(all, c, &count)) != NULL; ++c) {
-        for (size_t i = 0; i < count; ++i) {
-            const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
-            const double dx = 1e-6 * (b[0] - a[0]), dy = 1e-6 * (b[1] - a[1]);
-            const double middle[2] = {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])};
-            assert_true(vshi_outline_distance(all, (const double[]){middle[0] - dy, middle[1] + dx}) < 0.0);
-            assert_true(vshi_outline_distance(all, (const double[]){middle[0] + dy, middle[1] - dx}) > 0.0);
-        }
     }
 }
 
@@ -164,20 +152,18 @@ TEST(lines_are_aligned_and_spaced_by_options) {
     }
 }
 
-/* Cut eight times as fine the outline's area changes by less than the tolerance times its length. */
 TEST(curves_are_followed) {
     /* the outer contour of O: its points lie on the curve, so the polygon's error is in its area */
     OWNED(vsh_outline) *o = lines_of("O", VSH_ALIGN_LEFT);
     const vshi_outline_info info = info_of(o);
     assert_true(info.points > 100 && info.points < 2000);
-    double longest = 0.0, sharpest = 0.0;
+    double sharpest = 0.0;
     size_t count;
     const double *p = vshi_outline_contour(o, 0, &count);
     for (size_t i = 0; i < count; ++i) {
         const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count), *c = p + 2 * ((i + 2) % count);
         const double first = atan2(b[1] - a[1], b[0] - a[0]), second = atan2(c[1] - b[1], c[0] - b[0]);
         const double length = hypot(b[0] - a[0], b[1] - a[1]);
-        longest = fmax(longest, length);
         sharpest = fmax(sharpest, fabs(remainder(second - first, 2.0 * PI)) * length / 8.0); /* sagitta */
     }
     assert_true(sharpest < 3e-5);
@@ -248,8 +234,6 @@ TEST(bad_polygons_are_refused) {
 
 /* --- images */
 
-static const double at_corner[2] = {3.0, 4.0};
-
 static void write_image(int32_t width, int32_t height, int32_t channels, const char *const *names,
                         const float *const *planes) {
     const vsh_image image = {width, height, channels, names, planes, NULL};
@@ -279,8 +263,7 @@ TEST(a_solid_image_is_its_rectangle) {
     const vshi_outline_info info = info_of(outline);
     assert_true(info.area == 48.0 && info.contours == 1); /* square pixels: 8 × 6 */
     assert_true(info.bounds_min[0] == -4.0 && info.bounds_max[1] == 3.0);
-    const double beyond[2] = {-4.0 - at_corner[0], 3.0 + at_corner[1]};
-    assert_true(fabs(vshi_outline_distance(outline, beyond) - 5.0) < 1e-14);
+    assert_true(fabs(vshi_outline_distance(outline, (const double[]){-7.0, 7.0}) - 5.0) < 1e-14);
     options.height = 1.0;
     OWNED(vsh_outline) *flat = outline_of_image(&options);
     assert_true(info_of(flat).area == 8.0);
@@ -289,7 +272,7 @@ TEST(a_solid_image_is_its_rectangle) {
 /* A disc as a painter anti-aliases it: the share of each pixel that it covers, by 16 × 16 samples. */
 TEST(an_anti_aliased_disc_is_round) {
     enum { SIZE = 64 };
-    static float plane[SIZE * SIZE], hard[SIZE * SIZE];
+    static float plane[SIZE * SIZE];
     const double radius = 20.3, cx = 31.7, cy = 32.4; /* pixels, from the upper left corner */
     for (int i = 0; i < SIZE * SIZE; ++i) {
         int covered = 0;
@@ -299,26 +282,18 @@ TEST(an_anti_aliased_disc_is_round) {
             covered += hypot(x - cx, y - cy) < radius;
         }
         plane[i] = (float)covered / 256.0f;
-        hard[i] = covered >= 128 ? 1.0f : 0.0f;
     }
     vsh_mask_options options = vsh_mask_options_default();
     options.width = SIZE; /* a unit a pixel */
-    double worst[2] = {0.0, 0.0};
-    for (int pass = 0; pass < 2; ++pass) {
-        write_mask(SIZE, SIZE, pass == 0 ? plane : hard);
-        OWNED(vsh_outline) *outline = outline_of_image(&options);
-        assert_int_equal(info_of(outline).contours, 1);
-        for (int i = 0; i < 360; ++i) {
-            const double angle = PI * i / 180.0;
-            const double p[2] = {cx - 0.5 * SIZE + radius * cos(angle),
-                                 0.5 * SIZE - cy + radius * sin(angle)};
-            worst[pass] = fmax(worst[pass], fabs(vshi_outline_distance(outline, p)));
-        }
-        if (pass == 0) {
-            assert_true(fabs(info_of(outline).area / (PI * radius * radius) - 1.0) < 0.001);
-        }
+    write_mask(SIZE, SIZE, plane);
+    OWNED(vsh_outline) *outline = outline_of_image(&options);
+    assert_int_equal(info_of(outline).contours, 1);
+    assert_true(fabs(info_of(outline).area / (PI * radius * radius) - 1.0) < 0.001);
+    for (int i = 0; i < 360; ++i) {
+        const double angle = PI * i / 180.0;
+        const double p[2] = {cx - 0.5 * SIZE + radius * cos(angle), 0.5 * SIZE - cy + radius * sin(angle)};
+        assert_true(fabs(vshi_outline_distance(outline, p)) < 0.09); /* without anti-aliasing 0.3 */
     }
-    assert_true(worst[0] < 0.09 && worst[1] > 0.3);
 }
 
 /* Pixels that touch at corners only: by the middle of the four. */

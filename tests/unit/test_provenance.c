@@ -47,15 +47,6 @@ TEST(digests_of_folders_and_pipes_are_refused) {
     assert_fails(vsh_file_digest(at("pipe"), NULL, digest, &failure), VSH_ERROR_READ, "");
 }
 
-static const char *value_of(const vsh_attribute *list, size_t count, const char *name) {
-    for (size_t i = 0; i < count; ++i) {
-        if (strcmp(list[i].name, name) == 0) {
-            return list[i].value;
-        }
-    }
-    return NULL;
-}
-
 /* A glTF with a buffer beside it, one within, and one behind an escaped name. */
 TEST(settings_and_inputs_are_listed_in_order_and_once) {
     write_string(at("scene.json"), "{}");
@@ -120,9 +111,9 @@ TEST(settings_and_inputs_are_listed_in_order_and_once) {
     vsh_provenance_free(made);
 
     assert_int_equal(unlink(at("one.bin")), 0);
-    assert_fails(vsh_provenance_create(&source, NULL, &made, &failure), VSH_ERROR_READ, "");
+    assert_fails(vsh_provenance_create(&source, NULL, &made, &failure), VSH_ERROR_READ,
+                 "one.bin: cannot be read");
     assert_null(made);
-    assert_non_null(strstr(failure.message, "one.bin: cannot be read"));
 }
 
 /* A GLB with 64 MiB of binary data, where the limit on memory is 1 MiB. */
@@ -178,29 +169,6 @@ TEST(the_error_of_a_channel_is_read_from_its_attributes) {
     }
 }
 
-TEST(images_carry_them_and_give_them_back) {
-    static const char *const files[] = {"told.exr", "told.png"};
-    static const vsh_attribute told[] = {{"vdbshade_version", "0.2.0"}, {"long", "a line, with = and ;"}};
-    sample s;
-    make(&s, 5, 4, 3, LIGHTMAP);
-    for (size_t f = 0; f < 2; ++f) {
-        vsh_image_options options = vsh_image_options_default();
-        options.attributes = told;
-        options.attribute_count = 2;
-        assert_ok(vsh_image_write(at(files[f]), &s.image, &options, &failure));
-        OWNED(vsh_image_file) *file = image_from(at(files[f]));
-        size_t count = 0;
-        const vsh_attribute *list = vsh_image_attributes(file, &count);
-        for (size_t i = 0; i < 2; ++i) {
-            const char *value = value_of(list, count, told[i].name);
-            assert_non_null(value);
-            assert_string_equal(value, told[i].value);
-        }
-        assert_null(value_of(list, count, "type"));
-    }
-    unmake(&s);
-}
-
 TEST(level_sets_and_volumes_carry_them) {
     const vsh_sdf_node ball = vsh_sdf_node_default();
     OWNED(vsh_grid) *grid = grid_of_tree(&ball, 1, with_voxel(0.125));
@@ -248,8 +216,7 @@ TEST(attributes_that_no_file_could_hold_are_refused) {
         options.attributes = cases[i].list;
         options.attribute_count = cases[i].count;
         assert_fails(vsh_image_write(at("refused.exr"), &s.image, &options, &failure), VSH_ERROR_ARGUMENT,
-                     "");
-        assert_non_null(strstr(failure.message, cases[i].message));
+                     cases[i].message);
         assert_int_not_equal(access(at("refused.exr"), F_OK), 0);
     }
     unmake(&s);

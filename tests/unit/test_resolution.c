@@ -108,49 +108,6 @@ TEST(methods_that_need_voxels_are_refused_without_them) {
                      VSH_ERROR_ARGUMENT);
 }
 
-/* Shadows of a scene of the thin asset, in a layer of its own or in none, and the truth; returns what fields
- * take. */
-static uint64_t shade_scene(bool layered, float lit[POINTS], float truth[POINTS]) {
-    char text[1024];
-    snprintf(text, sizeof text,
-             "{\"casters\": [{\"mesh\": \"" VSH_ASSETS "/thin.glb\"%s}], \"layers\": [{\"name\": \"thin\"}], "
-             "\"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0.6, 0.75, 0.5], "
-             "\"angle_deg\": 5}], \"receivers\": []}",
-             layered ? ", \"layer\": \"thin\"" : "");
-    OWNED(vsh_scene) *scene = parse("/scene.json", text);
-    OWNED(vsh_assets) *assets = NULL;
-    OWNED(vsh_occluders) *made = NULL;
-    assert_ok(vsh_assets_load(scene, NULL, &assets, &failure));
-    assert_ok(vsh_scene_occluders(scene, assets, NULL, NULL, &made, &failure));
-    const vsh_occluders_info info = occluders_info(made);
-    assert_int_equal(info.layer_count, layered ? 1 : 0);
-    double positions[POINTS][3];
-    float normals[POINTS][3];
-    scatter(positions, normals);
-    const vsh_points points = {POINTS, positions[0], normals[0], NULL};
-    assert_ok(vsh_shade_shadow(made, &points, &scene->lights[0], NULL, NULL, lit, NULL, NULL, &failure));
-    OWNED(vshi_triangles) *triangles = NULL;
-    vshi_solids *solids = NULL;
-    assert_ok(vshi_scene_truth(scene, assets, NULL, &triangles, &solids, &failure));
-    see_light(triangles, solids, POINTS, positions[0], normals[0], 1e-6, &scene->lights[0], 1024, truth);
-    return info.field_bytes;
-}
-
-TEST(scenes_and_layers_without_voxels_match_the_truth) {
-    for (int layered = 0; layered < 2; ++layered) {
-        float lit[POINTS], truth[POINTS];
-        assert_true(shade_scene(layered != 0, lit, truth) == 0);
-        double square = 0.0;
-        int dark = 0;
-        for (int i = 0; i < POINTS; ++i) {
-            square += pow((double)lit[i] - (double)truth[i], 2.0);
-            dark += truth[i] < 0.5f;
-        }
-        assert_true(dark > 20 && dark < POINTS - 20);
-        assert_true(sqrt(square / POINTS) < 0.02);
-    }
-}
-
 /* --- what is chosen */
 
 static int32_t chosen(const char *more, const char *casters, double points) {

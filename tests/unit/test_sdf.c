@@ -87,47 +87,43 @@ TEST(every_shape_gives_the_distance_to_its_surface) {
 }
 
 TEST(closed_forms_hold) {
-    vsh_sdf_node node = shape_of(VSH_SDF_BOX);
-    const vsh_sdf sdf = {&node, 1};
-    const double corner[3] = {1.0, 0.8, 1.3};
-    assert_float_equal(vshi_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4), 1e-12);
-    node.rounding = 0.1;
-    assert_float_equal(vshi_sdf_distance(&sdf, corner), norm(0.3, 0.4, 0.4) - 0.1, 1e-12);
-    node = shape_of(VSH_SDF_CONE);
-    node.minor_radius = 0.0;
-    const double above[3] = {0.0, 1.0, 0.0};
-    assert_float_equal(vshi_sdf_distance(&sdf, above), 0.6, 1e-12);
-    node = shape_of(VSH_SDF_TORUS);
-    const double middle[3] = {0.0, 0.0, 0.0};
-    assert_float_equal(vshi_sdf_distance(&sdf, middle), 0.6, 1e-12);
-    node = shape_of(VSH_SDF_PLANE);
-    const double over[3] = {0.1, 2.0, 0.1};
-    assert_float_equal(vshi_sdf_distance(&sdf, over), 2.0, 1e-12);
-    const double nowhere[3] = {NAN, 0.0, 0.0};
-    assert_true(isnan(vshi_sdf_distance(&sdf, nowhere)));
+    static const struct {
+        int32_t shape;
+        double rounding, minor_radius, at[3], distance;
+    } cases[] = {
+        {VSH_SDF_BOX, 0.0, 0.2, {1.0, 0.8, 1.3}, 0.64031242374328485}, /* √(0.3² + 0.4² + 0.4²) */
+        {VSH_SDF_BOX, 0.1, 0.2, {1.0, 0.8, 1.3}, 0.54031242374328485},
+        {VSH_SDF_CONE, 0.0, 0.0, {0.0, 1.0, 0.0}, 0.6},
+        {VSH_SDF_TORUS, 0.0, 0.2, {0.0, 0.0, 0.0}, 0.6},
+        {VSH_SDF_PLANE, 0.0, 0.2, {0.1, 2.0, 0.1}, 2.0},
+        {VSH_SDF_PLANE, 0.0, 0.2, {NAN, 0.0, 0.0}, NAN},
+    };
+    for (size_t i = 0; i < COUNT_OF(cases); ++i) {
+        vsh_sdf_node node = shape_of(cases[i].shape);
+        node.rounding = cases[i].rounding;
+        node.minor_radius = cases[i].minor_radius;
+        const double distance = vshi_sdf_distance(&(vsh_sdf){&node, 1}, cases[i].at);
+        assert_true(isnan(cases[i].distance) ? isnan(distance) : fabs(distance - cases[i].distance) < 1e-12);
+    }
 }
 
-static void turn_somehow(vsh_sdf_node *node) {
+/* Turns, moves and scales a node, moving it by at most `reach` along each axis. */
+static void place_somehow(vsh_sdf_node *node, double reach) {
     for (int i = 0; i < 4; ++i) {
         node->rotation[i] = between(&counter, -1.0, 1.0);
     }
-    for (int i = 0; i < 3; ++i) {
-        node->translation[i] = between(&counter, -0.5, 0.5);
-    }
+    random_point(reach, node->translation);
     node->scale = between(&counter, 0.5, 2.0);
 }
 
-/* An operation over two shapes, all turned. */
+/* An operation over two shapes, all placed somehow. */
 static void make_tree(vsh_sdf_node nodes[3], int32_t a, int32_t b, int32_t operation) {
     nodes[0] = shape_of(a);
     nodes[1] = shape_of(b);
-    nodes[2] = vsh_sdf_node_default();
-    nodes[2].shape = operation;
-    nodes[2].left = 0;
-    nodes[2].right = 1;
+    nodes[2] = operation_node(operation, 0, 1);
     nodes[2].smoothing = 0.3;
     for (int i = 0; i < 3; ++i) {
-        turn_somehow(&nodes[i]);
+        place_somehow(&nodes[i], 0.5);
     }
 }
 
@@ -190,17 +186,13 @@ TEST(operations_are_the_sets_operations) {
     for (int round = 0; round < 49; ++round) {
         vsh_sdf_node nodes[3];
         make_tree(nodes, round / 7, round % 7, VSH_SDF_UNION);
-        const vsh_sdf both = {nodes, 3};
-        vsh_sdf_node plain[2] = {nodes[0], nodes[1]};
-        nodes[2].scale = 1.0;
-        memset(nodes[2].translation, 0, sizeof nodes[2].translation);
-        const double straight[4] = {0.0, 0.0, 0.0, 2.0};
-        memcpy(nodes[2].rotation, straight, sizeof straight);
-        const vsh_sdf left = {&plain[0], 1}, right = {&plain[1], 1};
+        nodes[2] = operation_node(VSH_SDF_UNION, 0, 1);
+        nodes[2].smoothing = 0.3;
+        const vsh_sdf both = {nodes, 3}, left = {&nodes[0], 1}, right = {&nodes[1], 1};
         for (int i = 0; i < 300; ++i) {
             double p[3];
             random_point(2.0, p);
-            const int a = vshi_sdf_distance(&left, p) < 0.0, b = vshi_sdf_distance(&right, p) < 0.0;
+            const bool a = vshi_sdf_distance(&left, p) < 0.0, b = vshi_sdf_distance(&right, p) < 0.0;
             nodes[2].shape = VSH_SDF_UNION;
             const double united = vshi_sdf_distance(&both, p);
             assert_int_equal(united < 0.0, a || b);
@@ -281,10 +273,7 @@ TEST(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works) {
         nodes[count] = vsh_sdf_node_default();
         nodes[count++].translation[0] = i;
         if (i > 0) {
-            nodes[count] = vsh_sdf_node_default();
-            nodes[count].shape = VSH_SDF_UNION;
-            nodes[count].left = (int32_t)count - 2;
-            nodes[count].right = (int32_t)count - 1;
+            nodes[count] = operation_node(VSH_SDF_UNION, (int32_t)count - 2, (int32_t)count - 1);
             ++count;
         }
     }
@@ -295,26 +284,19 @@ TEST(a_tree_too_deep_to_recurse_is_refused_and_a_deep_one_works) {
     refused(nodes, count, "deep");
 }
 
-/* A tree over `count` shapes of all kinds, turned, scaled, and joined by any operations. */
+/* A tree over `count` shapes of all kinds, placed somehow and joined by any operations. */
 static size_t random_tree(vsh_sdf_node *nodes, int count, bool unions) {
     size_t used = 0;
     int32_t last = -1;
     for (int i = 0; i < count; ++i) {
-        vsh_sdf_node node = shape_of((int32_t)between(&counter, VSH_SDF_SPHERE, VSH_SDF_CONE + 0.999));
-        for (int axis = 0; axis < 3; ++axis) {
-            node.translation[axis] = between(&counter, -4.0, 4.0);
-            node.rotation[axis] = between(&counter, -1.0, 1.0);
-        }
-        node.scale = between(&counter, 0.5, 2.0);
-        nodes[used] = node;
+        nodes[used] = shape_of((int32_t)between(&counter, VSH_SDF_SPHERE, VSH_SDF_CONE + 0.999));
+        place_somehow(&nodes[used], 4.0);
         const int32_t here = (int32_t)used++;
         if (last >= 0) {
-            vsh_sdf_node operation = vsh_sdf_node_default();
-            operation.shape = unions
-                                  ? VSH_SDF_UNION
-                                  : (int32_t)between(&counter, VSH_SDF_UNION, VSH_SDF_SMOOTH_UNION + 0.999);
-            operation.left = i % 2 == 0 ? last : here;
-            operation.right = i % 2 == 0 ? here : last;
+            const double most = unions ? VSH_SDF_UNION : VSH_SDF_SMOOTH_UNION;
+            const int32_t kind = (int32_t)between(&counter, VSH_SDF_UNION, most + 0.999);
+            vsh_sdf_node operation =
+                i % 2 == 0 ? operation_node(kind, last, here) : operation_node(kind, here, last);
             operation.smoothing = 0.3;
             operation.translation[i % 3] = between(&counter, -0.2, 0.2);
             operation.rotation[1] = between(&counter, -0.2, 0.2);

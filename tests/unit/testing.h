@@ -14,7 +14,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include <vdbshade/vdbshade.h>
 
 #include <vdbshade/vdbshade.h>
 
