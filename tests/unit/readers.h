@@ -101,6 +101,15 @@ inline int as_reader(int argc, char **argv) {
     return code;
 }
 
+// The main() of such a test.
+inline int run_all_tests_or_read(int argc, char **argv) {
+    const int served = as_reader(argc, argv);
+    if (served >= 0) {
+        _exit(served);
+    }
+    return make_folder() ? run_all_tests(nullptr, remove_folder) : 1;
+}
+
 inline std::vector<std::string> warned;
 
 inline vsh_run with_reader(bool wanted = true) {
@@ -137,33 +146,43 @@ std::vector<unsigned char> payload_of(vshi_serve_fn *serve, const std::string &p
     return bytes;
 }
 
-// Calls `refuses(decoder)` for a payload that is cut, and changed in one to four places, `count` times.
-// Returns how many are refused. The damage is the same in every run.
-template <typename Refuses>
-int damage(const std::vector<unsigned char> &whole, int count, Refuses &&refuses) {
-    static const uint64_t values[] = {
-        0, 1, UINT64_MAX, uint64_t(1) << 63, uint64_t(1) << 32, 0x7fc00000, 0x7ff0000000000000u};
-    uint64_t state = 1;
-    const auto next = [&] {
+// Numbers that are the same in every run.
+struct Random {
+    uint64_t state;
+    uint64_t operator()() {
         state = state * 6364136223846793005u + 1442695040888963407u;
         return state >> 33;
-    };
+    }
+};
+
+// Changes a file or an answer in one to four places: a bit, or a number to one at an end of its range.
+template <typename Bytes> void change_bytes(Bytes &bytes, Random &next) {
+    static const uint64_t values[] = {
+        0, 1, UINT64_MAX, uint64_t(1) << 63, uint64_t(1) << 32, 0x7fc00000, 0x7ff0000000000000u};
+    for (uint64_t k = next() % 4 + 1; k > 0; --k) {
+        // half of them near the beginning, where the counts are
+        const size_t reach = next() % 2 == 0 ? std::min<size_t>(bytes.size(), 256) : bytes.size();
+        const size_t at = next() % reach;
+        if (next() % 2 == 0) {
+            bytes[at] = static_cast<typename Bytes::value_type>(bytes[at] ^ (1u << next() % 8));
+        } else {
+            const uint64_t value = values[next() % (COUNT_OF(values))];
+            const size_t aligned = at / 8 * 8;
+            std::memcpy(bytes.data() + aligned, &value, std::min<size_t>(8, bytes.size() - aligned));
+        }
+    }
+}
+
+// Calls `refuses(decoder)` for a payload that is cut, or changed, `count` times. Returns how many are
+// refused.
+template <typename Refuses>
+int damage(const std::vector<unsigned char> &whole, int count, Refuses &&refuses) {
+    Random next{1};
     int refused = 0;
     for (int i = 0; i < count; ++i) {
         // an array of this size, so that a sanitizer sees reads behind its end
         std::vector<unsigned char> bytes(whole);
-        for (uint64_t k = next() % 4 + 1; k > 0; --k) {
-            // half of them near the beginning, where the counts are
-            const size_t reach = next() % 2 == 0 ? std::min<size_t>(bytes.size(), 256) : bytes.size();
-            const size_t at = next() % reach;
-            if (next() % 2 == 0) {
-                bytes[at] ^= static_cast<unsigned char>(1u << next() % 8);
-            } else {
-                const uint64_t value = values[next() % (COUNT_OF(values))];
-                const size_t aligned = at / 8 * 8;
-                std::memcpy(bytes.data() + aligned, &value, std::min<size_t>(8, bytes.size() - aligned));
-            }
-        }
+        change_bytes(bytes, next);
         if (next() % 4 == 0) {
             bytes.resize(next() % bytes.size() / 8 * 8);
             bytes.shrink_to_fit();

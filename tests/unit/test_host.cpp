@@ -182,14 +182,10 @@ TEST(arenas_of_the_host_change_nothing) {
 
 // One field, one query handle, one grid: shared by threads that shade, sample and bake volumes at once.
 TEST(many_threads_share_one_field) {
-    vsh_sdf_node node = vsh_sdf_node_default();
-    const vsh_sdf sdf = {&node, 1};
-    const vsh_grid_options grid_options = with_voxel(0.0625);
-    OWNED(vsh_grid) *grid = nullptr;
+    const vsh_sdf_node node = vsh_sdf_node_default();
+    OWNED(vsh_grid) *grid = grid_of_tree(&node, 1, with_voxel(0.0625));
     OWNED(vsh_occluders) *occluders = nullptr;
-    vsh_error error{};
-    assert_int_equal(vsh_grid_from_sdf(&sdf, &grid_options, nullptr, &grid, &error), VSH_OK);
-    assert_int_equal(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &error), VSH_OK);
+    assert_ok(vsh_occluders_from_grid(grid, nullptr, nullptr, &occluders, &failure));
     const vsh_light light = vsh_light_default();
     const auto bake = [&](int32_t threads) {
         Outcome o;

@@ -102,6 +102,54 @@ TEST(mended_grids_and_doubles_and_tiles_are_the_same) {
     }
 }
 
+// A file with masked materials, an image beside it and one within, and three kinds of lights.
+std::string materials_file() {
+    const std::string path = in_folder("materials.gltf");
+    put(path, R"({"asset": {"version": "2.0"}, "scenes": [{"nodes": [0, 1, 2, 3]}],
+"nodes": [{"mesh": 0}, {"name": "key", "rotation": [0, 0.6, 0, 0.8], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+    {"name": "lamp", "translation": [1, 2, 3], "extensions": {"KHR_lights_punctual": {"light": 1}}},
+    {"name": "spot", "translation": [4, 5, 6], "extensions": {"KHR_lights_punctual": {"light": 2}}}],
+"extensions": {"KHR_lights_punctual": {"lights": [{"type": "directional", "color": [1, 0.5, 0.25], "intensity": 4},
+    {"type": "point", "range": 7}, {"type": "spot", "spot": {"innerConeAngle": 0.125, "outerConeAngle": 0.5}}]}},
+"meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "material": 1}, {"attributes": {"POSITION": 0}},
+    {"attributes": {"POSITION": 0}, "material": 2}]}],
+"accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}],
+"materials": [{"name": "plain"}, {"name": "leaf", "alphaMode": "MASK", "alphaCutoff": 0.25, "doubleSided": true,
+    "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.75], "baseColorTexture": {"index": 0, "texCoord": 3,
+        "extensions": {"KHR_texture_transform": {"offset": [0.5, 0.25], "rotation": 1, "scale": [2, 4]}}}}},
+    {"name": "fern", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}],
+"samplers": [{"wrapS": 33071, "wrapT": 33648}], "textures": [{"source": 0, "sampler": 0}, {"source": 1}],
+"images": [{"uri": "data:image/png;base64,SU1BR0U="}, {"uri": "x.png"}]})");
+    return path;
+}
+
+void assert_same_materials(const vsh_model *here, const vsh_model *there) {
+    assert_int_equal(vshi_model_material_count(here), vshi_model_material_count(there));
+    for (size_t i = 0; i < vshi_model_material_count(here); ++i) {
+        const vshi_material a = vshi_model_get_material(here, i), b = vshi_model_get_material(there, i);
+        assert_string_equal(a.name, b.name);
+        assert_true(a.alpha == b.alpha && a.double_sided == b.double_sided && a.uv_set == b.uv_set);
+        assert_true(a.alpha_cutoff == b.alpha_cutoff && a.base_alpha == b.base_alpha);
+        assert_true(a.image_channel == b.image_channel && a.by_texture == b.by_texture);
+        assert_memory_equal(a.wrap, b.wrap, sizeof a.wrap);
+        assert_memory_equal(a.uv_transform, b.uv_transform, sizeof a.uv_transform);
+        assert_int_equal(a.image_size, b.image_size);
+        assert_memory_equal(a.image, b.image, a.image_size);
+        assert_int_equal(a.image_path != nullptr, b.image_path != nullptr);
+        assert_string_equal(a.image_path ? a.image_path : "", b.image_path ? b.image_path : "");
+    }
+}
+
+void assert_same_lights(const vsh_model *here, const vsh_model *there) {
+    assert_int_equal(vshi_model_light_count(here), vshi_model_light_count(there));
+    for (size_t i = 0; i < vshi_model_light_count(here); ++i) {
+        const vshi_model_light a = vshi_model_get_light(here, i), b = vshi_model_get_light(there, i);
+        assert_string_equal(a.name, b.name);
+        assert_int_equal(a.type, b.type);
+        assert_memory_equal(a.position, b.position, sizeof a - offsetof(vshi_model_light, position));
+    }
+}
+
 // Both arrays are there, or neither is.
 template <typename Value> void assert_same_array(const Value *a, const Value *b, size_t count) {
     assert_int_equal(a != nullptr, b != nullptr);
@@ -111,13 +159,17 @@ template <typename Value> void assert_same_array(const Value *a, const Value *b,
 }
 
 TEST(models_are_the_same) {
-    for (const char *name : {"/cloister.glb", "/cloister.obj", "/thin.glb", "/seeds_floor.obj"}) {
+    for (const std::string &path : {ASSETS + "/cloister.glb", ASSETS + "/cloister.obj", ASSETS + "/thin.glb",
+                                    ASSETS + "/seeds_floor.obj", materials_file()}) {
         const Both<vsh_model> read(vsh_model_free, [&](const vsh_run *run, vsh_model **model) {
-            return vsh_model_read((ASSETS + name).c_str(), run, model, &failure);
+            return vsh_model_read(path.c_str(), run, model, &failure);
         });
+        assert_same_materials(read.here, read.there);
+        assert_same_lights(read.here, read.there);
         const size_t count = vsh_model_mesh_count(read.here);
         assert_int_equal(vsh_model_mesh_count(read.there), count);
         for (size_t i = 0; i < count; ++i) {
+            assert_int_equal(vshi_model_mesh_material(read.there, i), vshi_model_mesh_material(read.here, i));
             assert_int_equal(vsh_model_uv_sets(read.there, i), vsh_model_uv_sets(read.here, i));
             for (int32_t set = -1; set < vsh_model_uv_sets(read.here, i); ++set) {
                 const vsh_mesh a = vsh_model_mesh(read.here, i, set), b = vsh_model_mesh(read.there, i, set);
@@ -465,22 +517,56 @@ TEST(damaged_voxels_are_refused_or_sorted) {
     assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
 }
 
+void assert_sound(const vsh_model *model) {
+    for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
+        const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
+        vsh_mesh_report report;
+        const vsh_result result = vsh_mesh_check(&mesh, &report, &failure);
+        assert_true(result == VSH_OK || result == VSH_ERROR_INPUT); // beyond numbers once moved
+        assert_true(vshi_model_mesh_material(model, i) < int32_t(vshi_model_material_count(model)));
+    }
+    for (size_t i = 0; i < vshi_model_material_count(model); ++i) {
+        const vshi_material m = vshi_model_get_material(model, i);
+        assert_in_range(m.uv_set, 0, VSH_MAX_UV_SETS - 1);
+        assert_in_range(m.wrap[0], 0, VSH_WRAP_CLAMP);
+        assert_in_range(m.alpha, 0, VSH_ALPHA_BLENDED);
+        assert_true(m.base_alpha >= 0.0 && m.base_alpha <= 1.0 && std::isfinite(m.uv_transform[5]));
+        assert_in_range(m.image != nullptr ? m.image_size : 0, 0, 16);
+    }
+    for (size_t i = 0; i < vshi_model_light_count(model); ++i) {
+        const vshi_model_light light = vshi_model_get_light(model, i);
+        assert_in_range(light.type, 0, VSHI_MODEL_LIGHT_SPOT);
+        assert_true(light.inner_angle <= light.outer_angle && light.outer_angle <= 1.5708);
+        assert_true(light.intensity >= 0.0 && std::isfinite(light.intensity) && light.range >= 0.0);
+    }
+}
+
 TEST(damaged_models_are_refused_or_sound) {
-    const auto whole = payload_of(vshi_serve_model, ASSETS + "/thin.glb", no_request);
-    const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
-        OWNED(vsh_model) *model = nullptr;
-        if (vshi_model_decode(decoder, "a.glb", nullptr, &model, &failure) != VSH_OK) {
-            return true;
-        }
-        for (size_t i = 0; i < vsh_model_mesh_count(model); ++i) {
-            const vsh_mesh mesh = vsh_model_mesh(model, i, -1);
-            vsh_mesh_report report;
-            const vsh_result result = vsh_mesh_check(&mesh, &report, &failure);
-            assert_true(result == VSH_OK || result == VSH_ERROR_INPUT); // beyond numbers once moved
-        }
-        return false;
-    });
-    assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+    for (const std::string &path : {ASSETS + "/thin.glb", materials_file()}) {
+        const auto whole = payload_of(vshi_serve_model, path, no_request);
+        const int refused = damage(whole, DAMAGES, [&](vshi_decoder *decoder) {
+            OWNED(vsh_model) *model = nullptr;
+            if (vshi_model_decode(decoder, path.c_str(), nullptr, &model, &failure) != VSH_OK) {
+                return true;
+            }
+            assert_sound(model);
+            return false;
+        });
+        assert_in_range(refused, DAMAGES / 8, DAMAGES - 1);
+    }
+}
+
+TEST(a_path_from_a_reader_that_leaves_the_folder_is_refused) {
+    const std::string path = materials_file(), image = in_folder("x.png"), outside = "/etc/passwd";
+    auto bytes = payload_of(vshi_serve_model, path, no_request);
+    const auto at = std::search(bytes.begin(), bytes.end(), image.begin(), image.end());
+    assert_true(at != bytes.end());
+    std::fill_n(at, image.size(), '/'); // whose length stays
+    std::copy(outside.begin(), outside.end(), at + long(image.size() - outside.size()));
+    vshi_decoder decoder = {bytes.data(), bytes.data() + bytes.size(), false};
+    vsh_model *model = nullptr;
+    assert_fails(vshi_model_decode(&decoder, path.c_str(), nullptr, &model, &failure), VSH_ERROR_READ,
+                 "its images");
 }
 
 TEST(damaged_decompressed_vertices_are_refused_or_sound) {
@@ -592,9 +678,5 @@ TEST(an_answer_and_the_heap_share_their_room) {
 } // namespace
 
 int main(int argc, char **argv) {
-    const int served = as_reader(argc, argv);
-    if (served >= 0) {
-        _exit(served);
-    }
-    return make_folder() ? run_all_tests(nullptr, remove_folder) : 1;
+    return run_all_tests_or_read(argc, argv);
 }

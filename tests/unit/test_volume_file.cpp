@@ -163,9 +163,6 @@ TEST(grids_without_voxels_are_refused) {
     refused(path, "Empty", VSH_ERROR_INPUT, {"no grid 'Empty'", "'velocity', 'empty'"});
     refused(save("vectors.vdb", {vectors}), nullptr, VSH_ERROR_INPUT, {"'velocity'", "numbers"});
     refused(save("none.vdb", {}), nullptr, VSH_ERROR_INPUT, {"holds no grids"});
-    refused(in_folder("nothing.vdb"), nullptr, VSH_ERROR_READ, {"nothing.vdb"});
-    std::ofstream(in_folder("short.vdb"), std::ios::binary) << content(path).substr(0, 400);
-    refused(in_folder("short.vdb"), nullptr, VSH_ERROR_READ, {"short.vdb"});
     // one tile of the root holds 4096³ voxels
     const FloatGrid::Ptr huge = FloatGrid::create(0.0f);
     huge->setName("huge");
