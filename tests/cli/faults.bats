@@ -11,27 +11,26 @@ prepare() {
 
 QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points points.csv --quiet)
 
-@test "a run removes what killed runs left, and nothing else" {
-    local mine=(.out.99999999.tmp.exr .out.99999998-3.tmp.exr .stats.99999999.tmp.json)
-    local other=(.out.99999999.tmp.png .out.tmp.exr .out2.99999999.tmp.exr .out.x.tmp.exr .stats.json.99999999.tmp)
-    touch "${mine[@]}" "${other[@]}"
-    touch .out.99999997.tmp.exr # of a process that another machine knows
-    exec 9>.out.99999997.tmp.exr
-    flock -n 9
-    succeed bake box.obj "${SMALL[@]}" --quiet --stats stats.json -o out.exr 9>&-
-    exec 9>&-
-    for file in "${mine[@]}"; do
-        [ ! -e "$file" ] || fail "$file is still there"
+@test "a bake that is killed at any time leaves the old output, and the next one tidies up" {
+    local bake=("$VDBSHADE" bake "$ASSETS/cloister.glb" --sun -0.5,0.8,-0.6 --sun-angle 5 --ao 1 --size 512 --resolution 48 --quiet)
+    "${bake[@]}" --method rays --rays 4 -o old.exr
+    local start whole i pid killed=0
+    start=$(date +%s%N)
+    "${bake[@]}" -o new.exr
+    whole=$((($(date +%s%N) - start) / 1000000))
+    ! cmp -s old.exr new.exr || fail "old and new are alike"
+    for ((i = 0; i < 6; ++i)); do
+        cp old.exr out.exr
+        "${bake[@]}" -o out.exr &
+        pid=$!
+        sleep "$(printf '%d.%03d' $((whole * i / 6000)) $((whole * i / 6 % 1000)))"
+        kill -KILL $pid || true
+        wait $pid || killed=$((killed + 1))
+        cmp -s old.exr out.exr || cmp new.exr out.exr || fail "$i: neither the old nor the new"
+        "${bake[@]}" --size 16 --resolution 16 -o out.exr
+        no_leftovers
     done
-    for file in "${other[@]}" .out.99999997.tmp.exr; do
-        [ -e "$file" ] || fail "$file is gone"
-    done
-}
-
-@test "kill -9 at points over a bake: the old output is intact, the next run tidies up" {
-    run "$BATS_TEST_DIRNAME/../faults/kill-bakes" "$VDBSHADE" 6
-    echo "$output"
-    [ "$status" -eq 0 ]
+    [ "$killed" -gt 0 ] || fail "none was killed"
 }
 
 # full_at FILE SIZE COMMAND …: the command on a disk that takes SIZE bytes of a file, which are to be enough for the error.
@@ -43,7 +42,7 @@ full_at() {
     untouched "$file"
 }
 
-@test "a disk that is full at any byte leaves the old rows, statistics and pages" {
+@test "a disk that is full at any byte leaves the old rows, level sets and statistics" {
     local size whole
     shade "${QUERY[@]}" -o out.csv
     whole=$(stat -c %s out.csv)
@@ -55,6 +54,8 @@ full_at() {
     for size in 256 4096; do
         full_at out.ply "$size" "${QUERY[@]}" -o out.ply
     done
+    old_output out.vdb
+    full_at out.vdb 1024 voxelize box.obj --quiet -o out.vdb # by a module, whose calls tests/faults does not see
     sed -i 3q points.csv # rows that the disk has room for
     shade "${QUERY[@]}" -o out.raw --stats stats.json
     whole=$(stat -c %s stats.json)
@@ -64,10 +65,7 @@ full_at() {
     done
 }
 
-@test "a pipe that nobody reads is an error that is told; a complete run replaces the old output" {
-    run bash -c '"$@" -o - 2>err.txt | true; exit "${PIPESTATUS[0]}"' - "$VDBSHADE" "${QUERY[@]}"
-    [ "$status" -eq 3 ] || fail "status"
-    grep -q 'standard output: cannot be written: Broken pipe' err.txt || fail "$(cat err.txt)"
+@test "a complete run replaces the old output" {
     old_output out.exr
     succeed "${BAKE[@]}" out.exr --quiet
     [ "$(head -c 4 out.exr | od -An -tx1 | tr -d ' ')" = 762f3101 ] || fail "no EXR"
@@ -77,11 +75,10 @@ full_at() {
 
 BAKE=(bake box.obj "${SMALL[@]}" -o)
 
-@test "a folder that does not exist or cannot be written to, a folder in place of the output, endings, bits and packings that are none" {
+@test "bake refuses folders it cannot write to, and unknown endings, bits and channels" {
     mkdir folder.exr
     mkfifo pipe.png
     refuse_each "${BAKE[@]}" <<'LIST'
-3 none/out.exr | none/out.exr
 3 none/stats.json | out.exr --stats none/stats.json
 3 folder.exr | folder.exr
 3 pipe.png 'no regular file' | pipe.png
@@ -115,7 +112,7 @@ LIST
     cmp box.obj copy.obj
 }
 
-@test "a limit on the size of files that a reader's answer passes is told" {
+@test "the error names ulimit -f if a reader's answer is larger" {
     # 402 vertices with UVs are 8 KB, however they are sent; the lightmap is under 4.
     awk 'BEGIN { for (i = 0; i <= 200; ++i) { x = i / 200; printf "v %g 0 0\nv %g 0 1\nvt %g 0\nvt %g 1\n", x, x, x, x }
          for (i = 1; i < 400; i += 2) printf "f %d/%d %d/%d %d/%d %d/%d\n", i, i, i + 1, i + 1, i + 3, i + 3, i + 2, i + 2 }' >strip.obj
@@ -125,21 +122,6 @@ LIST
     untouched out.exr
     limited "-f 4" bake strip.obj --sandbox off "${SMALL[@]}" --quiet -o out.exr
     done_well
-}
-
-@test "a full disk leaves the old lightmap and the old level set" {
-    local out command
-    while read -r out command; do
-        old_output "$out"
-        # the limit counts blocks of 1 KiB; each output takes more
-        limited "-f 1" $command box.obj --sandbox off --quiet -o "$out"
-        refused 3 "$out"
-        untouched "$out"
-    done <<LIST
-out.exr bake ${SMALL[*]} --size 256 --ao 1
-out.png bake ${SMALL[*]} --size 256 --ao 1 --bits 16
-out.vdb voxelize
-LIST
 }
 
 @test "--output-folder takes all outputs of a scene by their names, and nothing else" {

@@ -2,8 +2,6 @@
 #include "scenarios.h"
 #include "../unit/previews.h"
 
-OWNER(vsh_provenance)
-
 static void free_list(double **list) {
     vshi_spheres_list_free(*list);
 }
@@ -50,14 +48,6 @@ static void parts_place(double positions[3 * POINTS], float normals[3 * POINTS])
 }
 
 /* --- the scenarios */
-
-static vsh_result read_scenes(const vsh_run *run, vsh_error *error) {
-    OWNED(vsh_scene) *scene = NULL;
-    OWNED(vsh_flat_scene) *flat = NULL;
-    MAKE(scene, vsh_scene_read("scene.json", NULL, &scene, error));
-    MAKE(flat, vsh_flat_scene_read("flat.json", NULL, &flat, error));
-    return VSH_OK;
-}
 
 static vsh_result read_models(const vsh_run *run, vsh_error *error) {
     static const char *const names[] = {"box.obj", "triangle.ply", "triangle.stl"};
@@ -199,34 +189,11 @@ static vsh_result ask(const vsh_run *run, vsh_error *error) {
 }
 
 static vsh_result make_casters(const vsh_run *run, vsh_error *error) {
-    OWNED(vsh_model) *model = NULL;
-    OWNED(vshi_triangles) *triangles = NULL;
-    OWNED(vshi_solids) *solids = NULL;
     OWNED(vsh_occluders) *occluders = NULL;
     vsh_occluders_options few = vsh_occluders_options_default();
     few.grid.resolution = 10;
-    const vsh_sdf_node node = vsh_sdf_node_default();
-    const vsh_sdf sdf = {&node, 1};
-    MAKE(model, vsh_model_read("box.obj", run, &model, error));
-    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
+    const vsh_mesh mesh = cube();
     MAKE(occluders, vsh_occluders_create(&mesh, 1, &few, run, &occluders, error));
-    MAKE(solids, vshi_solids_create(&sdf, NULL, 1, &solids, error));
-    MAKE(triangles, vshi_triangles_create(&mesh, 1, NULL, run, &triangles, error));
-    return VSH_OK;
-}
-
-static vsh_result tell_origin(const vsh_run *run, vsh_error *error) {
-    OWNED(vsh_scene) *scene = NULL;
-    OWNED(vsh_provenance) *provenance = NULL;
-    static const char *const file = "scene.json";
-    MAKE(scene, vsh_scene_read(file, NULL, &scene, error));
-    vsh_provenance_source source = vsh_provenance_source_default();
-    source.scene = scene;
-    source.files = &file;
-    source.file_count = 1;
-    source.command = "bake scene.json";
-    source.voxel_size = 0.1;
-    MAKE(provenance, vsh_provenance_create(&source, run, &provenance, error));
     return VSH_OK;
 }
 
@@ -482,7 +449,6 @@ static vsh_result read_images(const vsh_run *run, vsh_error *error) {
 }
 
 const scenario scenarios[] = {
-    {"scene files", read_scenes},
     {"models", read_models},
     {"a scene's assets", load_scene},
     {"a scene baked", bake_scene},
@@ -499,7 +465,6 @@ const scenario scenarios[] = {
     {"a PNG file written", write_png},
     {"a TIFF file written", write_tif},
     {"images read", read_images},
-    {"an output's origin", tell_origin},
     {"a lit document written", light_document},
     {"a lit model written", light_model},
     {"a comparison", compare},
