@@ -17,77 +17,25 @@ points() {
         }' "$1"
 }
 
-# What the C API answers for raw rows of 6 floats: shadow, ao, distance, gradient of each, as raw floats.
-api() {
-    cat >api.c <<'C'
-#include <stdio.h>
-#include <stdlib.h>
-#include <vdbshade/vdbshade.h>
-#define CHECK(call) if ((call) != VSH_OK) return fprintf(stderr, "%s\n", error.message), 1
-int main(int argc, char **argv) {
-    (void)argc;
-    vsh_error error = {0};
-    vsh_scene *scene;
-    vsh_assets *assets;
-    vsh_occluders *occluders;
-    vsh_query *query;
-    CHECK(vsh_scene_read("scene.json", NULL, &scene, &error));
-    CHECK(vsh_assets_load(scene, NULL, &assets, &error));
-    CHECK(vsh_scene_occluders(scene, assets, NULL, NULL, &occluders, &error));
-    vsh_shade_options shade = scene->shade;
-    shade.method = vsh_find_name(VSH_NAMES_SHADOW, argv[1]);
-    shade.ao_method = VSH_AO_TAPS;
-    CHECK(vsh_query_create(occluders, scene->lights, scene->light_count, &shade, &query, &error));
-    enum { MOST = 100000 };
-    static float rows[MOST][6], answers[MOST][6];
-    const vsh_points points = {fread(rows, sizeof rows[0], MOST, stdin), NULL, rows[0] + 3, NULL};
-    vsh_point_layout layout = vsh_point_layout_default();
-    layout.float_positions = rows[0];
-    layout.position_stride = layout.normal_stride = sizeof rows[0];
-    float *const visibility[1] = {answers[0]};
-    vsh_query_output output = vsh_query_output_default();
-    output.visibility = visibility;
-    output.ao = answers[0] + 1;
-    output.distance = answers[0] + 2;
-    output.gradient = answers[0] + 3;
-    output.stride = sizeof answers[0];
-    CHECK(vsh_query_points(query, &points, &layout, NULL, &output, NULL, &error));
-    fwrite(answers, sizeof answers[0], points.count, stdout);
-    vsh_query_free(query);
-    vsh_occluders_free(occluders);
-    vsh_assets_free(assets);
-    vsh_scene_free(scene);
-    return 0;
-}
-C
-    compile api
-    ./api "$1"
-}
-
 ANSWERS=(--distance --gradient --answers-only)
 
-@test "file, pipe and C API give the same bits, in every format" {
+@test "files and pipes of every format give the same bits" {
     points 40000 >p.raw # enough to be put in order
-    for method in cone adaptive; do
-        api "$method" <p.raw >api.raw
-        [ "$(wc -c <api.raw)" -eq 960000 ]
-        succeed "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points p.raw --normals yes -o file.raw
-        cmp file.raw api.raw
-        "$VDBSHADE" "${QUERY[@]}" --method "$method" "${ANSWERS[@]}" --points - --points-format raw --normals yes -o - \
-            <p.raw | cmp - api.raw
-    done
+    QUERY+=(--method adaptive)
+    succeed "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes -o file.raw
+    [ "$(wc -c <file.raw)" -eq 960000 ]
+    "$VDBSHADE" "${QUERY[@]}" "${ANSWERS[@]}" --points - --points-format raw --normals yes -o - <p.raw | cmp - file.raw
     # the points through CSV and PLY, and the answers back
     for format in csv ply; do
         "$VDBSHADE" "${QUERY[@]}" --distance --points p.raw --normals yes -o "p.$format"
-        "$VDBSHADE" "${QUERY[@]}" --method adaptive "${ANSWERS[@]}" --points "p.$format" -o "$format.raw"
-        cmp "$format.raw" api.raw
+        "$VDBSHADE" "${QUERY[@]}" "${ANSWERS[@]}" --points "p.$format" -o "$format.raw"
+        cmp "$format.raw" file.raw
         # and by text: a CSV of answers, read as positions, is the answers
-        "$VDBSHADE" "${QUERY[@]}" --method adaptive "${ANSWERS[@]}" --points - --points-format "$format" --format csv \
-            -o - <"p.$format" >"$format.csv"
+        "$VDBSHADE" "${QUERY[@]}" "${ANSWERS[@]}" --points - --points-format "$format" --format csv -o - <"p.$format" >"$format.csv"
         [ "$(head -1 "$format.csv")" = "shadow.sun,ao,distance,gradient.x,gradient.y,gradient.z" ] || fail "head"
         cmp "$format.csv" csv.csv
     done
-    perl -F, -ne 'print pack("f<6", @F) if $. > 1' csv.csv | cmp - api.raw
+    perl -F, -ne 'print pack("f<6", @F) if $. > 1' csv.csv | cmp - file.raw
 }
 
 @test "threads, batches and memory change no bit" {
@@ -101,7 +49,7 @@ ANSWERS=(--distance --gradient --answers-only)
     refuses 4 "memory limit" -- "${QUERY[@]}" "${ANSWERS[@]}" --points p.raw --normals yes --memory-limit 4M -o part.raw
 }
 
-@test "rows that are kept are answered in batches as long as without them" {
+@test "keeping rows does not change the length of batches" {
     points 4000 >p.raw
     QUERY+=(--method adaptive --batch 1000 --points p.raw --normals yes) # whose rays depend on the batch
     succeed "${QUERY[@]}" --answers-only -o alone.raw
@@ -109,7 +57,7 @@ ANSWERS=(--distance --gradient --answers-only)
     perl -ne 'BEGIN { $/ = \32 } print substr $_, 24' kept.raw | cmp - alone.raw
 }
 
-@test "a CSV keeps its rows, whatever their columns, and answers stand behind them" {
+@test "answers are appended to the columns of a CSV, which stay as they are" {
     printf 'id;nz;Y;x;z;note;nx;ny\r\n7;0;0.001;0.5;0.5;"a b";0;1\r\n\r\n# a comment\r\n8;0; 0.001 ;"2.1";2;;0;1' >p.csv
     succeed "${QUERY[@]}" --points p.csv -o out.csv
     [ "$(cut -d';' -f1-8 out.csv)" = "$(printf 'id;nz;Y;x;z;note;nx;ny\n7;0;0.001;0.5;0.5;"a b";0;1\n8;0; 0.001 ;"2.1";2;;0;1')" ]
@@ -121,14 +69,6 @@ ANSWERS=(--distance --gradient --answers-only)
     succeed "${QUERY[@]}" --points p.xyz -o out.xyz
     [ "$(cut -d' ' -f9- <out.xyz | head -1)" = "$(sed -n 2p out.csv | cut -d';' -f9- | tr ';' ' ')" ] || fail "$(cat out.xyz)"
     [ "$(wc -l <out.xyz)" -eq 2 ]
-}
-
-@test "points as far away as a number goes are lit by exact" {
-    local far
-    for far in 1e15 1e19 1e30 1e300; do printf '%s,%s,0,0,1,0\n-%s,-%s,0,0,1,0\n' $far $far $far $far; done >p.csv
-    succeed query "$ASSETS/cloister.glb" --resolution 48 --points p.csv --sun 0.6,0.75,0.5 --sun-angle 3 --ao 0.6 \
-        --method exact --ao-method exact --quiet -o out.csv
-    awk -F, '$7 != 1 || $8 != 1 { bad = 1 } END { exit bad || NR != 8 }' out.csv
 }
 
 @test "without normals there is no ao, and no horizon; nothing but answers goes to standard output" {
@@ -146,7 +86,7 @@ ANSWERS=(--distance --gradient --answers-only)
     [[ $stderr == *voxelize* ]] || fail "no progress"
 }
 
-@test "bad rows are told by number and answered nan, the rest as without them" {
+@test "bad rows are reported by number and answered nan, and change no other row" {
     cat >good.csv <<'CSV'
 x,y,z,nx,ny,nz
 0.5,0.001,0.5,0,1,0
@@ -187,14 +127,6 @@ CSV
     old_output strict.csv
     refuses 2 "row 2: 2 columns" -- "${QUERY[@]}" --points bad.csv -o strict.csv --strict
     untouched strict.csv
-}
-
-@test "a locale with a decimal comma changes nothing" {
-    printf 'x,y,z,nx,ny,nz\n0.5,0.001,0.5,0,1,0\n' >p.csv
-    shade "${QUERY[@]}" --points p.csv -o a.csv
-    LC_ALL=de_DE.UTF-8 shade "${QUERY[@]}" --points p.csv -o b.csv
-    done_well
-    cmp a.csv b.csv
 }
 
 # ply FORMAT: a mesh of two triangles, properties in an odd order.
@@ -317,7 +249,7 @@ CASES
     [ ! -s err.txt ]
 }
 
-@test "a pipe or disk that takes no more ends the run" {
+@test "a pipe or device that takes no more ends the run" {
     points 40000 >p.raw
     QUERY+=(--points p.raw --normals yes)
     run bash -c '"$0" "${@}" --format csv -o - 2>err.txt | head -1; exit "${PIPESTATUS[0]}"' "$VDBSHADE" "${QUERY[@]}"
@@ -326,28 +258,20 @@ CASES
     [ ! -e /dev/full ] || {
         run bash -c '"$0" "${@}" -o - 2>err.txt >/dev/full' "$VDBSHADE" "${QUERY[@]}"
         [ "$status" -eq 3 ]
-        grep -q 'standard output: cannot be written' err.txt
+        grep -q 'standard output: cannot be written: No space left' err.txt
     }
     run bash -c '"$0" "${@}" -o - 2>err.txt >&-' "$VDBSHADE" "${QUERY[@]}"
     [ "$status" -eq 3 ]
-    old_output out.raw
-    run bash -c 'ulimit -f 16; "$0" "${@}" -o out.raw 2>err.txt' "$VDBSHADE" "${QUERY[@]}"
-    [ "$status" -eq 3 ] || fail "$(cat err.txt)"
-    untouched out.raw
 }
 
 @test "wrong options are refused by name" {
     printf 'x,y,z\n0.5,0.001,0.5\n' >p.csv
     refuse_each query scene.json <<'CASES'
 2 --points | -o out.csv
-2 '-o OUT' | --points p.csv
 2 --points-format | --points - -o -
 2 out.dat --format | --points p.csv -o out.dat
 2 exr csv | --points p.csv --format exr -o out.dat
-2 maybe yes no | --points p.csv --normals maybe -o out.csv
-2 --batch | --points p.csv --batch 0 -o out.csv
 2 p.csv | --points p.csv -o p.csv
-2 scene.json | --points p.csv -o scene.json --format csv
 3 none.csv | --points none.csv -o out.csv
 3 folder | --points . --points-format csv -o out.csv
 2 --error | --points p.csv --method cone --ao-method cones --error -o out.csv
@@ -355,7 +279,7 @@ CASES
     [ ! -e out.csv ]
 }
 
-@test "--error answers what error is left" {
+@test "--error answers the estimated error" {
     points 500 >p.raw
     succeed "${QUERY[@]}" --points p.raw --normals yes --method adaptive --max-error 0.05 --error -o out.csv
     [ "$(head -1 out.csv)" = x,y,z,nx,ny,nz,shadow.sun,ao,error.sun ]

@@ -111,6 +111,21 @@ class Values(Case):
         self.assertSame(vdbshade.shade_ao(occluders, positions, normals, ao_method="cones"), of_c[1])
         self.assertSame(occluders.field.sample(positions), of_c[2])
 
+    def test_points_have_the_bits_of_the_command_line(self):
+        positions, normals = points_on_floor(40000)
+        rows = numpy.hstack([positions, normals]).astype(numpy.float32)
+        rows.tofile(self.folder / "points.raw")
+        scene = vdbshade.Scene(casters=[ASSETS / "cloister.glb"], lights=[sun(**LIT)], ao=0.6, resolution=64)
+        occluders = vdbshade.Assets(scene).occluders(voxels=True)
+        for method in ("cone", "adaptive"):
+            self.cli("query", ASSETS / "cloister.glb", "--sun", "0.6,0.75,0.5", "--sun-angle", 3, "--ao", 0.6, "--resolution", 64,
+                     "--method", method, "--ao-method", "taps", "--points", "points.raw", "--normals", "yes", "--distance", "--gradient",
+                     "--answers-only", "-o", "answers.raw")
+            answers = numpy.fromfile(self.folder / "answers.raw", numpy.float32).reshape(-1, 6)
+            query = vdbshade.Query(occluders, sun(**LIT), method=method, ao_method="taps", ao_distance=0.6)
+            found = query.points(rows[:, :3], rows[:, 3:], ao=True, distance=True, gradient=True)
+            self.assertSame(numpy.column_stack([found["shadow"][0], found["ao"], found["distance"], found["gradient"]]), answers)
+
     def test_layouts_change_no_bit(self):
         query = vdbshade.Query(vdbshade.Occluders(box(), resolution=64), sun(), method="cone", ao_method="cones")
         positions, normals = points_on_floor(1000)
