@@ -21,7 +21,7 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     info_tells lit.glb "2, in 3 meshes, 16 triangles; UV sets: 2"
 }
 
-@test "a glTF has its buffer and its images beside it, and the EXR that is asked for" {
+@test "a glTF has its buffer and images beside it, and --exr writes the lightmap" {
     succeed bake "$MODELS/scene.gltf" "${BAKE[@]}" --irradiance --ambient 0.2,0.2,0.2 --seams keep -o lit.gltf \
         --exr all.exr
     [ "$(files '*')" = "all.exr lit.bin lit.gltf lit.lightmap.png lit.occlusion.png" ] || fail "$(files)"
@@ -38,15 +38,7 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     show_gltf lit.glb text | grep -q '"TEXCOORD_0"' || fail "no UVs"
 }
 
-@test "objects that do not receive keep their materials, and any number of threads makes the same file" {
-    succeed bake "$MODELS/scene.glb" "${BAKE[@]}" --receive ell -o lit.glb
-    [ "$(show_gltf lit.glb text | grep -o '"occlusionTexture"' | wc -l)" -eq 1 ] || fail "$(show_gltf lit.glb text)"
-    succeed bake "$MODELS/scene.glb" "${BAKE[@]}" -o whole.glb
-    succeed bake "$MODELS/scene.glb" "${BAKE[@]}" -o one.glb --threads 1
-    cmp whole.glb one.glb
-}
-
-@test "options that are for assets alone, and that assets do not have, are refused" {
+@test "options that only assets have, and those that assets lack, are refused" {
     cp "$MODELS/scene.glb" in.glb
     for words in "--preview -o a.png" "--exr b.exr -o a.png"; do
         # shellcheck disable=SC2086
@@ -68,7 +60,7 @@ sets_are() {
     [ "$found" = "${*:2}" ] || fail "$1: $found"
 }
 
-@test "new UVs take the place of the lightmap set, or of one whose textures they replace, and of no others" {
+@test "new UVs replace the old lightmap's set, and no set that other textures use" {
     cp "$MODELS/scene.glb" lit0.glb
     local n
     for n in 1 2 3; do
@@ -97,25 +89,6 @@ sets_are() {
     sets_are fbx.glb 2 1
 }
 
-# sizes FILE: bytes, then how many textures, images, samplers, buffer views and accessors it has.
-sizes() {
-    show_gltf "$1" size $(printf 'len(root["%s"]) ' textures images samplers bufferViews accessors)
-}
-
-@test "an asset that is lit over and over keeps its size" {
-    local model n
-    for model in scene.glb scene_draco.glb figure.glb; do
-        cp "$MODELS/$model" lit0.glb
-        for n in 1 2 3 4; do
-            # light is the same, so that its images are; of which file it is does not show in the length
-            succeed bake lit$((n - 1)).glb "${BAKE[@]}" --seams keep --unwrap always -o lit$n.glb
-        done
-        [ "$(sizes lit2.glb)" = "$(sizes lit3.glb)" ] && [ "$(sizes lit3.glb)" = "$(sizes lit4.glb)" ] ||
-            fail "$model: $(sizes lit1.glb), $(sizes lit2.glb), $(sizes lit3.glb), $(sizes lit4.glb)"
-        [[ $(sizes lit4.glb) == *" 2 2 1 "* ]] || fail "$model: $(sizes lit4.glb)"
-    done
-}
-
 @test "a mesh that has no room for another set of UVs is refused" {
     cp "$MODELS"/scene.* .
     local eight='&'
@@ -134,14 +107,6 @@ sizes() {
     succeed bake eight.gltf --ao 1 --size 32 --unwrap always -o out.exr
 }
 
-# material FILE: prints the set and transform of the first material's base colour, AO and light, and the sets of its primitives.
-material() {
-    show_gltf "$1" '"; ".join(" ".join(map(str, [info.get("texCoord", 0), *info.get("extensions", {}).get("KHR_texture_transform", {}).get("scale", [])]))
-                         for one in root["materials"][:1]
-                         for info in (one["pbrMetallicRoughness"]["baseColorTexture"], one["occlusionTexture"], one["extensions"]["MOZ_lightmap"])) + ";"' \
-        'sorted(name for name in root["meshes"][0]["primitives"][0]["attributes"] if name[0] == "T")'
-}
-
 @test "UVs that a packer made integers are baked as its textures see them" {
     write_packed plain.gltf 5126 1
     write_packed packed.gltf 5123 4096 '{"scale": [0.000244140625, 0.000244140625]}' # 1 / 4096
@@ -149,13 +114,11 @@ material() {
         succeed bake $file.gltf "${BAKE[@]}" --unwrap never -o $file.exr
     done
     same plain.exr packed.exr
-    # an asset gets new UVs in a set of their own
+    # an asset gets new UVs in a set of their own, or uses the file's own UVs through the same transform
     succeed bake packed.gltf "${BAKE[@]}" --size 64 -o anew.glb
-    [ "$(material anew.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material anew.glb)"
-    # or uses the file's own UVs through the same transform
+    sets_are anew.glb 2 1
     succeed bake packed.gltf "${BAKE[@]}" --unwrap never -o own.glb
-    local moved="0 0.000244140625 0.000244140625; "
-    [ "$(material own.glb)" = "$moved$moved${moved}TEXCOORD_0" ] || fail "$(material own.glb)"
+    show_gltf own.glb text | grep -q '"occlusionTexture":{[^}]*"scale":\[0.000244140625,' || fail "AO without the transform"
     succeed bake own.glb "${BAKE[@]}" --unwrap never -o own.exr
     same plain.exr own.exr
     # an OBJ has no transform, so its UVs include it
@@ -164,46 +127,10 @@ material() {
     # textures with different transforms leave the packing unknown: all UVs are new
     sed 's/"baseColorTexture"/"metallicRoughnessTexture": {"index": 0}, &/' packed.gltf >mixed.gltf
     succeed bake mixed.gltf "${BAKE[@]}" --size 64 -o mixed.glb
-    [ "$(material mixed.glb)" = "0 0.000244140625 0.000244140625; 1; 1; TEXCOORD_0 TEXCOORD_1" ] || fail "$(material mixed.glb)"
+    sets_are mixed.glb 2 1
 }
 
-@test "the validator finds no error, and no warning that the input had not" {
-    node -e 'require("gltf-validator")' 2>/dev/null || skip "no gltf-validator"
-    [ -n "${TEST_LIT:-}" ] || skip "no test_lit"
-    mkdir kept
-    TMPDIR=$PWD VSH_LIT_KEEP=$PWD/kept "$TEST_LIT" >/dev/null 2>&1 || fail "test_lit"
-    for model in scene.glb scene.gltf figure.glb scene_draco.glb scene.fbx; do
-        for kind in "" --preview; do
-            # shellcheck disable=SC2086
-            succeed bake "$MODELS/$model" "${BAKE[@]}" $kind -o "kept/$model$kind.glb"
-        done
-        succeed bake "$MODELS/$model" "${BAKE[@]}" -o "kept/$model.gltf"
-        succeed bake "kept/$model.gltf" "${BAKE[@]}" --unwrap always -o "kept/$model.twice.glb"
-        succeed bake "kept/$model.twice.glb" "${BAKE[@]}" --unwrap always -o "kept/$model.thrice.glb"
-    done
-    [ "$(ls kept/*.glb kept/*.gltf | wc -l)" -gt 35 ]
-    cat >validate.js <<'EOF'
-const validator = require('gltf-validator'), fs = require('fs'), path = require('path');
-(async () => {
-    let bad = 0;
-    for (const file of process.argv.slice(2)) {
-        const read = (uri) => Promise.resolve(new Uint8Array(fs.readFileSync(path.join(path.dirname(file), decodeURIComponent(uri)))));
-        const report = await validator.validateBytes(new Uint8Array(fs.readFileSync(file)), {externalResourceFunction: read});
-        for (const m of report.issues.messages) {
-            // the figure's skinned node has a parent, as Blender wrote it
-            if (m.severity < 2 && m.code !== 'NODE_SKINNED_MESH_NON_ROOT') {
-                console.log(file, m.code, m.message, m.pointer);
-                ++bad;
-            }
-        }
-    }
-    process.exit(bad ? 1 : 0);
-})();
-EOF
-    node validate.js kept/*.glb kept/*.gltf || fail "see above"
-}
-
-@test "light from all around is whole beside an occlusion texture, which viewers multiply it by" {
+@test "beside an occlusion texture the lightmap has ambient light without AO" {
     cat >dark.json <<JSON
 {"casters": [{"mesh": "$MODELS/scene.glb"}], "irradiance": true, "ambient": [0.5, 0.5, 0.5], "ao": {"distance": 1},
  "lights": [{"name": "sun", "type": "directional", "direction": [0.4, 0.8, 0.3], "color": [0, 0, 0]}],

@@ -13,13 +13,12 @@ write_level() {
 GLTF
 }
 
-# write_leaf FILE MATERIAL ALPHAS [COLORS]: a leaf of 1 × 1 over a floor of 4 × 4. Its four corners have the alphas, or COLORS.
+# write_leaf FILE MATERIAL COLORS: a leaf of 1 × 1 over a floor of 4 × 4. Its four corners have the colours.
 write_leaf() {
-    local colors=${4:-\"alphas\": [$3]}
     write_gltf "$1" <<GLTF
 {"nodes": [{"name": "floor", "mesh": 0}, {"name": "leaf", "mesh": 1}], "materials": [$2],
  "meshes": [{"primitives": [{"plate": [-2, 0, -2, 2, 2]}]},
-            {"primitives": [{"plate": [-0.5, 1, -0.5, 0.5, 0.5], "attributes": {"COLOR_0": {$colors}}, "material": 0}]}],
+            {"primitives": [{"plate": [-0.5, 1, -0.5, 0.5, 0.5], "attributes": {"COLOR_0": {$3}}, "material": 0}]}],
  "textures": [{"source": 0}], "images": [{"uri": "emblem.png"}]}
 GLTF
 }
@@ -36,7 +35,7 @@ write_obj() {
 }
 
 # Clear on the left, opaque on the right; between them alpha is u.
-FADE='0, 255, 255, 0' FAINT='102, 102, 102, 102' WHOLE='255, 255, 255, 255'
+FADE='"alphas":[0,255,255,0]' FAINT='"alphas":[102,102,102,102]' WHOLE='"alphas":[255,255,255,255]'
 TEXTURE='"baseColorTexture": {"index": 0}'
 
 # Images of four columns of grey or of red and green, of which half are opaque; and others.
@@ -52,8 +51,9 @@ prepare() {
     printf 'P5 8 1 255\n\40\60\100\120\140\160\200\220' >smoke.pgm
 }
 
+# leaf MODE [SURFACE]
 leaf() {
-    printf '{"name": "leaf", "alphaMode": "%s", "pbrMetallicRoughness": {%s}}' "$1" "$TEXTURE"
+    printf '{"name": "leaf", "alphaMode": "%s", "pbrMetallicRoughness": {%s}}' "$1" "${2-$TEXTURE}"
 }
 
 # mask CUTOFF [SURFACE]
@@ -68,12 +68,6 @@ bake() {
     succeed bake "$1" "${BAKE[@]}" --receive floor -o "$2" "${@:3}"
 }
 
-# bake_leaf OUT MATERIAL ALPHAS [COLORS]: the same of write_leaf().
-bake_leaf() {
-    write_leaf "${1%.exr}.gltf" "${@:2}"
-    bake "${1%.exr}.gltf" "$1"
-}
-
 # bake_obj STATEMENTS OUT [options]: the same of write_obj().
 bake_obj() {
     write_obj "$1"
@@ -85,7 +79,7 @@ lit() {
     holds "(100 * $(mean_of "$1" shadow.sun) - $2) ^ 2 < 0.2 ^ 2"
 }
 
-@test "a texture beside the file, in it, and without the confined reader are one, for any number of threads" {
+@test "a texture beside the file, in it, and without the confined reader casts the same" {
     write_level within.gltf "$(leaf MASK)" "data:image/png;base64,$(base64 -w0 emblem.png)"
     bake masked.gltf beside.exr
     bake within.gltf within.exr
@@ -94,16 +88,6 @@ lit() {
     same beside.exr within.exr
     same beside.exr trusted.exr
     differ beside.exr whole.exr
-    bake masked.gltf one.exr --threads 1
-    bake masked.gltf two.exr --threads 2
-    same one.exr two.exr
-}
-
-@test "exact with voxels is exact without" {
-    bake masked.gltf none.exr --max-error 0.005
-    bake masked.gltf fine.exr --max-error 0.005 --method exact --ao-method exact --resolution 96
-    # each keeps 0.005; single values and edges are those of other rays
-    succeed compare fine.exr none.exr --max-rmse 0.004 --max-difference 0.1 --max-p99 1 --max-penumbra 9 --max-shift 9
 }
 
 @test "a texture outside of the folder is not read" {
@@ -115,24 +99,6 @@ lit() {
     bake masked.gltf beside.exr
     same allowed.exr beside.exr
     differ out.exr beside.exr
-}
-
-@test "blended materials cast where they are cut out, by --cast-blended too, and glass only by that" {
-    write_level hashed.gltf "$(leaf BLEND)" emblem.png
-    bake masked.gltf masked.exr
-    bake hashed.gltf hashed.exr --verbose
-    says "blended materials that their textures cut out"
-    same masked.exr hashed.exr
-    bake hashed.gltf asked.exr --cast-blended
-    same masked.exr asked.exr
-    write_level glass.gltf '{"name": "leaf", "alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 1, 1, 0.2]}}' emblem.png
-    bake glass.gltf glass.exr
-    says "1 of 3 meshes have blended materials (glass, smoke) and cast no shadow"
-    bake whole.gltf without.exr --no-cast leaf
-    same glass.exr without.exr
-    bake glass.gltf asked.exr --cast-blended
-    bake whole.gltf whole.exr
-    same asked.exr whole.exr
 }
 
 @test "materials are chosen by name where no object is called so" {
@@ -157,26 +123,22 @@ lit() {
 }
 
 @test "light on the backs of one-sided materials comes through" {
-    # the plates' fronts are up
-    one_sided() { # MESH
-        cat >scene.json <<JSON
-{"casters": [{"mesh": "$1", "one_sided": ["leaf", "material:wood"]}], "ao": {"distance": 1},
- "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 1}],
- "receivers": [{"mesh": "$1", "objects": "floor", "size": 96, "output": "scene.exr"}]}
-JSON
-    }
-    bake whole.gltf whole.exr
-    one_sided whole.gltf
-    succeed bake scene.json -o above.exr
-    same whole.exr above.exr
     sed 's/"translation": \[-0.5, 0, 0\]/"translation": [-0.5, 2, 0], "rotation": [1, 0, 0, 0]/' whole.gltf >turned.gltf
-    bake turned.gltf both.exr
+    local mesh
+    for mesh in whole turned; do # the plates' fronts are up, or down
+        cat >$mesh.json <<JSON
+{"casters": [{"mesh": "$mesh.gltf", "one_sided": ["leaf", "material:wood"]}], "ao": {"distance": 1},
+ "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "angle_deg": 1}],
+ "receivers": [{"mesh": "$mesh.gltf", "objects": "floor", "size": 96, "output": "$mesh.one_sided.exr"}]}
+JSON
+        succeed bake $mesh.json
+        bake $mesh.gltf $mesh.exr
+    done
+    same whole.exr whole.one_sided.exr
     bake turned.gltf none.exr --no-cast plate
-    differ both.exr none.exr
-    one_sided turned.gltf
-    succeed bake scene.json
-    same scene.exr none.exr
-    succeed_saying "2 of 3 meshes are one-sided, but voxels cast to both sides" -- bake scene.json --method cone --ao-method cones -o cone.exr
+    differ turned.exr none.exr
+    same turned.one_sided.exr none.exr
+    succeed_saying "2 of 3 meshes are one-sided, but voxels cast to both sides" -- bake turned.json --method cone --ao-method cones -o cone.exr
 }
 
 @test "in a lit asset a material that does not receive stays as it was, and info says how it casts" {
@@ -208,168 +170,124 @@ inputs_are() {
     inputs_are out.exr level.obj 'left half.pgm' level.mtl
 }
 
-@test "no output replaces what is read with a model" {
+@test "no output replaces a file that a model names" {
     write_level level.gltf "$(leaf MASK)" emblem.png
     sed -i 's,"uri": "data:[^"]*","uri": "level.bin",' level.gltf
     sed 's/.*base64,\([^"]*\).*/\1/' masked.gltf | base64 -d >level.bin
     ln -s emblem.png link.png
     ln level.bin hard.json
-    sha256sum emblem.png level.bin >sums
-    local out again="the output is also an input"
+    write_obj 'map_d left half.png'
+    cp emblem.png 'left half.png'
+    sha256sum emblem.png level.bin level.mtl 'left half.png' >sums
+    local out
     for out in emblem.png link.png; do
-        refuses 2 "$out: $again" emblem.png -- bake level.gltf "${BAKE[@]}" --receive floor -o "$out"
-        refuses 2 "$out: $again" emblem.png -- render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
+        refuses 2 "$out: the output is also an input" emblem.png -- bake level.gltf "${BAKE[@]}" --receive floor -o "$out"
+        refuses 2 "$out: the output is also an input" emblem.png -- render level.gltf --sun 0,1,0 --size 16x16 -o "$out"
+        refuses 2 "$out: the output is also an input" -- bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
     done
-    for out in emblem.png link.png level.bin hard.json; do
-        refuses 2 "$out: $again" -- bake level.gltf "${BAKE[@]}" --receive floor -o out.exr --stats "$out"
-    done
+    refuse_each bake "${BAKE[@]}" --receive floor <<'LIST'
+2 'level.bin: the output is also an input' | level.gltf -o out.exr --stats level.bin
+2 'hard.json: the output is also an input' | level.gltf -o out.exr --stats hard.json
+2 'left half.png: the output is also an input' | level.obj --no-cast material:leaf -o 'left half.png'
+2 'level.mtl: the output is also an input' | level.obj -o out.exr --stats level.mtl
+LIST
     sha256sum --check --quiet sums || fail "an input was replaced"
     bake level.gltf out.exr
     bake level.gltf out.exr
-    cp emblem.png 'left half.png'
-    write_obj 'map_d left half.png'
-    refuses 2 "left half.png: $again" -- bake level.obj "${BAKE[@]}" --receive floor --no-cast material:leaf -o 'left half.png'
-    refuses 2 "level.mtl: $again" -- bake level.obj "${BAKE[@]}" --receive floor -o out.exr --stats level.mtl
 }
 
-@test "parts of a bake and golden bakes are told from those of another texture" {
-    mkdir scenes
-    write_bake scenes/leaf.json '{"mesh": "../masked.gltf"}' '' '"mesh": "../masked.gltf", "objects": ["floor"], "size": 32'
-    "$VDBSHADE" regress scenes --update --quiet
-    bake masked.gltf part.exr --shard 1/2
-    "$VDBSHADE" bake "$ASSETS/seeds_floor.obj" --sun 0,1,0 --size 8 -o emblem.png --quiet # which is opaque
-    bake masked.gltf part.exr --shard 2/2
-    refuses 2 part.exr.1-of-2.part 'was baked from other inputs or options' emblem.png -- merge part.exr
-    differ_printing "leaf: not alike" -- regress scenes
-}
-
-@test "light comes through where map_d is dark" {
-    bake_obj 'map_d right.pgm' right.exr --verbose
-    says "blended materials that their textures cut out"
+@test "map_d cuts out where it is dark, by its options, and a warning names what cannot be read" {
+    bake_obj '' whole.exr
+    lit whole.exr 87.5
+    bake_obj '' without.exr --no-cast material:leaf
+    bake_obj 'map_d right.pgm' right.exr
     lit right.exr 90.625 # all but 1.5 of 16
     bake_obj 'map_d left half.pgm' left.exr
     lit left.exr 90.625
     differ left.exr right.exr
-    bake_obj '' whole.exr
-    lit whole.exr 87.5
+    bake_obj 'map_d twice.pgm' twice.exr
+    bake masked.gltf emblem.exr
+    mkdir -p textures
+    cp right.pgm textures/
+    local statements expected said
+    while IFS='|' read -r statements expected said; do
+        bake_obj "$statements" out.exr --verbose
+        same out.exr "$expected.exr" || fail "$statements"
+        says "$said"
+    done <<'LIST'
+map_d right.pgm|right|blended materials that their textures cut out
+map_d emblem.png|emblem|
+map_d -imfchan m emblem.png|emblem|
+map_d -blendu on -texres 4 -o 0.5 0 0 right.pgm|left|
+map_d -o 0.5 right.pgm|left|
+map_d -s 2 1 1 right.pgm|twice|
+map_d -imfchan r both.ppm|right|
+map_d -imfchan g both.ppm|left|
+map_d textures\\\\right.pgm|right|
+map_d -mm 0 1 right.pgm|right|level.mtl: line 4: 'map_d' is read without its option '-mm'
+map_d -what on right.pgm|whole|level.mtl: line 4: 'map_d' has the option '-what'
+map_d opaque.pgm|whole|
+map_d gone.pgm|whole|material 'leaf' casts whole, without the holes of its texture
+map_Kd right.pgm|whole|
+map_d smoke.pgm|without|1 of 3 meshes have blended materials (glass, smoke) and cast no shadow
+d 0.3\nmap_d right.pgm|without|
+map_d right.pgm\nd 0.7|right|
+LIST
+    bake_obj 'map_d -s 2 -clamp on right.pgm' clamped.exr
+    lit clamped.exr 89.0625 # the last column goes on: three quarters are there
     bake_obj 'map_d right.pgm' blended.exr --cast-blended
     same blended.exr right.exr
     info_tells level.obj "it casts no shadow, unless its texture cuts it out"
 }
 
-@test "map_d with an image that has alpha cuts out as a glTF's mask does" {
-    bake masked.gltf gltf.exr --no-cast wood
-    bake_obj 'map_d emblem.png' obj.exr --no-cast material:wood
-    same obj.exr gltf.exr
-    bake_obj 'map_d -imfchan m emblem.png' matte.exr --no-cast material:wood
-    same matte.exr gltf.exr
-}
-
-@test "options of map_d" {
-    bake_obj 'map_d right.pgm' right.exr
-    bake_obj 'map_d left half.pgm' left.exr
-    bake_obj 'map_d twice.pgm' twice.exr
-    mkdir -p textures
-    cp right.pgm textures/
-    while IFS='|' read -r statement expected; do
-        bake_obj "map_d $statement" out.exr
-        same out.exr "$expected.exr"
-    done <<'LIST'
--blendu on -texres 4 -o 0.5 0 0 right.pgm|left
--o 0.5 right.pgm|left
--s 2 1 1 right.pgm|twice
--imfchan r both.ppm|right
--imfchan g both.ppm|left
-textures\\\\right.pgm|right
--mm 0 1 right.pgm|right
-LIST
-    says "level.mtl: line 4: 'map_d' is read without its option '-mm'"
-    bake_obj 'map_d -s 2 -clamp on right.pgm' clamped.exr
-    lit clamped.exr 89.0625 # the last column goes on: three quarters are there
-}
-
-@test "casters cast whole if their mask is opaque or missing" {
-    bake_obj '' whole.exr
-    bake_obj 'map_d opaque.pgm' out.exr
-    same out.exr whole.exr
-    bake_obj 'map_d gone.pgm' out.exr
-    says "material 'leaf' casts whole, without the holes of its texture"
-    same out.exr whole.exr
-    bake_obj 'map_d -what on right.pgm' out.exr
-    says "level.mtl: line 4: 'map_d' has the option '-what'"
-    same out.exr whole.exr
-    bake_obj 'map_Kd right.pgm' out.exr
-    same out.exr whole.exr
-    mkdir -p in
-    write_obj 'map_d ../right.pgm'
-    mv level.* in/
-    bake in/level.obj out.exr
-    says "in/level.mtl: line 4: 'map_d' names 'in/../right.pgm' outside of the model's folder"
-    same out.exr whole.exr
-}
-
-@test "a material library that is missing is named" {
+@test "a material library that is missing, and a mask outside of the folder, are named" {
     bake_obj 'd 0.3' there.exr
     [[ $stderr != *library* ]] || fail "it is there"
     rm level.mtl
     bake level.obj gone.exr
     says "level.obj: the material library 'level.mtl' cannot be read"
+    mkdir -p in
+    write_obj 'map_d ../right.pgm'
+    mv level.* in/
+    bake in/level.obj out.exr
+    says "in/level.mtl: line 4: 'map_d' names 'in/../right.pgm' outside of the model's folder"
+    lit out.exr 87.5
 }
 
-@test "materials neither clear nor opaque are glass" {
-    bake_obj '' without.exr --no-cast material:leaf
-    bake_obj 'map_d smoke.pgm' smoke.exr
-    says "1 of 3 meshes have blended materials (glass, smoke) and cast no shadow"
-    same smoke.exr without.exr
-    bake_obj 'd 0.3\nmap_d right.pgm' thin.exr
-    same thin.exr without.exr
-    bake_obj 'map_d right.pgm\nd 0.7' thick.exr
-    bake_obj 'map_d right.pgm' right.exr
-    same thick.exr right.exr
-}
-
-@test "a mask's edge runs where alpha between vertices is the cutoff" {
-    bake_leaf half.exr "$(mask 0.5)" "$FADE"
-    lit half.exr 96.875
-    bake_leaf more.exr "$(mask 0.25)" "$FADE"
-    lit more.exr 95.3125
-    bake_leaf factor.exr "$(mask 0.25 '"baseColorFactor": [1, 1, 1, 0.5]')" "$FADE"
-    same factor.exr half.exr
-    bake half.gltf trusted.exr --sandbox off --threads 1
-    same trusted.exr half.exr
-    bake_leaf whole.exr '{}' "$FADE"
-    lit whole.exr 93.75
-    bake_leaf three.exr "$(mask 0.5)" '' '"VEC3": [255, 255, 255, 0, 0, 0, 0, 0, 0, 255, 255, 255], "componentType": 5121, "normalized": true'
-    same three.exr whole.exr
-}
-
-@test "voxels have the same edge" {
-    write_leaf half.gltf "$(mask 0.5)" "$FADE"
-    bake half.gltf made.exr --method cone --resolution 96
-    write_leaf whole.gltf "$(mask 0.5)" "$WHOLE"
-    bake whole.gltf whole.exr --method cone --resolution 96
-    differ made.exr whole.exr
-}
-
-@test "one alpha at all vertices is a factor" {
-    bake_leaf clear.exr "$(mask 0.5)" "$FAINT"
-    lit clear.exr 100
-    bake_leaf faint.exr "$(mask 0.25 "$TEXTURE")" "$FAINT"
-    bake_leaf factor.exr "$(mask 0.25 "$TEXTURE, \"baseColorFactor\": [1, 1, 1, 0.4]")" "$WHOLE"
-    same faint.exr factor.exr
-}
-
-@test "blended leaves whose vertices are clear or opaque are cut out, and fading ones beside a texture are as it is" {
-    local blend='{"alphaMode": "BLEND", "pbrMetallicRoughness": {}}'
-    bake_leaf masked.exr "$(mask 0.5)" "$FADE"
-    write_leaf blended.gltf "$blend" "$FADE"
-    bake blended.gltf blended.exr --verbose
+@test "alpha at vertices cuts out where it passes the cutoff, or is a factor" {
+    local name material alphas expected
+    while IFS='|' read -r name expected material alphas; do
+        write_leaf "$name.gltf" "$material" "$alphas"
+        bake "$name.gltf" "$name.exr" --verbose
+        case $expected in
+            [0-9]*) lit "$name.exr" "$expected" ;;
+            *) same "$name.exr" "$expected.exr" ;;
+        esac || fail "$name"
+    done <<LIST
+half|96.875|$(mask 0.5)|$FADE
+more|95.3125|$(mask 0.25)|$FADE
+factor|half|$(mask 0.25 '"baseColorFactor": [1, 1, 1, 0.5]')|$FADE
+whole|93.75|{}|$FADE
+without alpha|whole|$(mask 0.5)|"VEC3":[255,255,255,0,0,0,0,0,0,255,255,255],"componentType":5121,"normalized":true
+clear|100|$(mask 0.5)|$FAINT
+times a texture|97.99|$(mask 0.25 "$TEXTURE, \"baseColorFactor\": [1, 1, 1, 0.4]")|$WHOLE
+faint|times a texture|$(mask 0.25 "$TEXTURE")|$FAINT
+smoke|100|$(leaf BLEND '')|"alphas":[64,128,160,112]
+blended|half|$(leaf BLEND '')|$FADE
+LIST
     says "blended materials that their textures cut out"
-    same masked.exr blended.exr
-    bake_leaf smoke.exr "$blend" '64, 128, 160, 112'
-    lit smoke.exr 100
-    bake_leaf textured.exr "$(mask 0.5 "$TEXTURE")" "$FADE"
+    bake half.gltf trusted.exr --sandbox off
+    same trusted.exr half.exr
+    bake half.gltf marched.exr --method cone --resolution 96
+    bake whole.gltf marched_whole.exr --method cone --resolution 96
+    differ marched.exr marched_whole.exr
+}
+
+@test "the alpha of vertices is ignored beside a texture's, with a warning, if it fades" {
+    write_leaf fading.gltf "$(mask 0.5 "$TEXTURE")" "$FADE"
+    bake fading.gltf fading.exr
     says "the alpha of its vertices is ignored beside a texture's"
-    bake_leaf plain.exr "$(mask 0.5 "$TEXTURE")" "$WHOLE"
-    same textured.exr plain.exr
+    write_leaf plain.gltf "$(mask 0.5 "$TEXTURE")" "$WHOLE"
+    bake plain.gltf plain.exr
+    same fading.exr plain.exr
 }

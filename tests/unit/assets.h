@@ -262,23 +262,9 @@ static inline vsh_lit_image white_image(int32_t purpose, uint32_t page) {
     return (vsh_lit_image){.purpose = purpose, .page = page, .png = white_png, .png_size = sizeof white_png};
 }
 
-/* Keeps what a test wrote where VSH_LIT_KEEP names a folder, for validators; a GLB, which needs no names. */
-static inline void keep_file(const char *path) {
-    const char *kept = getenv("VSH_LIT_KEEP");
-    static int number;
-    if (kept != NULL && strstr(path, ".glb") != NULL) {
-        char command[2000];
-        snprintf(command, sizeof command,
-                 "cp '%s' '%s/%d-%03d.glb' && cp '%s/'*.png '%s' 2>/dev/null || true", path, kept,
-                 (int)getpid(), ++number, folder, kept);
-        assert_int_equal(system(command), 0);
-    }
-}
-
 static inline void write_lit(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                              const vsh_lit_options *options, const char *output) {
     assert_ok(vsh_lit_write(path, model, meshes, options, output, NULL, &failure));
-    keep_file(output);
 }
 
 static inline vsh_lit_options options_of(const vsh_lit_image *images, size_t count) {
