@@ -57,7 +57,7 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
     pixel_is 250 300 $(lit 5 5 5 1 1 1 "$(over_pi '150 / 255')")
 }
 
-@test "AO alone, the lightmap alone, exposure, base colour" {
+@test "the page shows AO, the lightmap or base colour alone, and exposure brightens it" {
     show_squares
     look squares.html "$FRONT&texels=1&mode=ao"
     pixel_is 150 100 128 128 128
@@ -71,7 +71,7 @@ FRONT="fov=90&camera=0,0,1,0,0,0&ui=0"
     pixel_is 350 100 255 255 255
 }
 
-@test "a picked texel tells its place and its values" {
+@test "the panel shows place and values of a picked texel" {
     show_squares
     look squares.html "ui=1&$FRONT&mode=charts&pick=0.875,0.3"
     page_has '<h2>square b</h2>' '<th>UV set</th><td>2</td>' '<th>UV</th><td>0.87500  0.30000</td>' \
@@ -107,7 +107,7 @@ texels_are() {
     done
 }
 
-@test "the planes of a bake: each texel shows what the file has" {
+@test "the page shows each texel of a bake as the file has it" {
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=ao,G=shadow.sun,B=0 --bits 8 -o corner.png
@@ -135,7 +135,7 @@ texels_are() {
     [ "$(sort -u <<<"${shown[0]}" | wc -l)" -ge 2 ] || fail "one colour: ${shown[0]}"
 }
 
-@test "a scene: light, shadow and AO at the vertices of its surface, which can be picked" {
+@test "the page shows light, shadow and AO at the vertices of a scene's surface, and picks them" {
     sed 's/"voxel_size": 0.02/"voxel_size": 0.05/' "$ASSETS/seeds.json" >seeds.json
     succeed view seeds.json -o seeds.html --quiet
     # 4 × 4 of the floor from above: x and z from -2 to 2, a pixel is 0.01 at y = 0. What is higher is nearer the border.
@@ -151,7 +151,7 @@ texels_are() {
     page_has '<h2>surface</h2>' '<th>UV set</th><td>none</td>' '<th>shadow.sun</th><td>1</td>' '<th>ao</th><td>1</td>'
 }
 
-@test "bilinear lookups between texels, and bent normals as (1 + n) / 2" {
+@test "the page interpolates texels bilinearly, and shows bent normals as (1 + n) / 2" {
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o bent.png
@@ -165,7 +165,7 @@ texels_are() {
         awk '{ for (i = 1; i <= 3; ++i) s[i] += $i / 4 } END { print s[1], s[2], s[3] }')
 }
 
-@test "keys choose, the mouse turns and picks" {
+@test "keys choose the mode, and the mouse turns the view and picks" {
     show_squares
     look squares.html "$FRONT&texels=1" key:2
     pixel_is 150 100 128 128 128
@@ -187,7 +187,7 @@ texels_are() {
     [ "$(picture get page.png 20 200)" != "$(cat seen)" ] || fail "dragging turns nothing"
 }
 
-@test "a slider between two bakes: the first on the left, the second on the right" {
+@test "the slider shows the first bake on the left and the second on the right" {
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o near.exr
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" --ao 0.1 -o far.exr
@@ -215,7 +215,7 @@ texels_are() {
 ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     return r.width > 0 && e.contains(document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)); }'
 
-@test "on a phone targets are 44 pixels large, the panel takes a third, and Hide can be taken back" {
+@test "on a phone buttons are 44 pixels large, the panel covers a third, and Show undoes Hide" {
     write_squares
     write_corner
     succeed view squares.gltf corner.obj -o models.html --quiet
@@ -239,7 +239,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     [ "$(cat told)" = $'\ntrue' ] || fail "cut: $(cat told)"
 }
 
-@test "texel density, checker and charts of a mesh without a bake" {
+@test "the page shows texel density, checker and charts of a mesh without a bake" {
     write_corner
     succeed view corner.obj -o corner.html --quiet
     # floor: 512 × 1024 texels over 2 × 2; wall: 410 × 1024 over 1 × 2; no lightmap: 1024² is taken
@@ -294,7 +294,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     page_has 'squares.gltf: image 7 is not shown'
 }
 
-@test "textures whose image is in EXT_texture_webp are shown, and others are named with their format" {
+@test "the page shows EXT_texture_webp, and names textures of other formats" {
     write_squares
     # decoders look at the bytes, so a PNG can stand in for a WebP here
     sed 's/"textures": \[{"source": 0}, {"source": 1}\]/"textures": [{"extensions": {"EXT_texture_webp": {"source": 0}}}, {"extensions": {"KHR_texture_basisu": {"source": 1}}}]/
@@ -306,7 +306,7 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     ! grep -q 'undefined\|texture 0\|image 0' <(grep -o 'id="problems".*' page.dom | head -c 400)
 }
 
-@test "docs/lit.md: the lines for three.js show a lit glTF as it is meant" {
+@test "the three.js code of docs/lit.md shows a lit glTF as the page does" {
     three=/usr/share/javascript/three
     write_squares
     sed -i 's/"baseColorFactor"/"metallicFactor": 0, &/g' squares.gltf

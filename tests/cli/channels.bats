@@ -58,7 +58,7 @@ scene_of() {
     sed -i 's/"direction": .*, "angle_deg": 5/"direction": [-1, 1.2, 0], "angle_deg": 20/' "$1"
 }
 
-@test "a layer casts as the casters in none do, harder or only for some lights where it says so" {
+@test "a layer casts as other casters do, unless its softness or lights differ" {
     scene_of one.json '' ''
     scene_of layer.json ', "layer": "wall"' '"layers": [{"name": "wall", "voxel_size": 0.05}],'
     scene_of hard.json ', "layer": "wall"' '"layers": [{"name": "wall", "softness": 0}],'

@@ -14,10 +14,10 @@ teardown() {
     [ -z "${VICTIM:-}" ] || kill "$VICTIM" 2>/dev/null || true
 }
 
-# taken_over HOW [ARGUMENT…]: vdbshade with a reader whose parser, and threads from before its main, are hostile.
+# taken_over HOW [FILE]: vdbshade with a reader whose parser, and threads from before its main, are hostile.
 taken_over() {
     run --separate-stderr env LD_PRELOAD="$HOSTILE" VSH_TEST_HOSTILE="$1" VSH_TEST_FOLDER="$PWD" \
-        VSH_TEST_VICTIM="$VICTIM" "$VDBSHADE" info box.obj "${@:2}"
+        VSH_TEST_VICTIM="$VICTIM" "$VDBSHADE" info "${2:-box.obj}"
 }
 
 unharmed() {
@@ -33,7 +33,7 @@ unharmed() {
     unharmed
 }
 
-@test "calls of another kind of machine end the reader at once, all of its threads" {
+@test "x32 and 32-bit calls end the reader at once, with all of its threads" {
     [ "$(uname -m)" = x86_64 ] || skip "x32 and 32 bit are x86-64's"
     local how
     for how in x32 i386; do
@@ -54,8 +54,7 @@ unharmed() {
     echo secret >outside/secret
     mv box.obj model/box.obj
     export VSH_TEST_OUTSIDE=$PWD/outside/secret TOKEN_OF_THE_HOST=secret
-    run --separate-stderr env LD_PRELOAD="$HOSTILE" VSH_TEST_HOSTILE=reads VSH_TEST_FOLDER="$PWD" \
-        VSH_TEST_VICTIM="$VICTIM" "$VDBSHADE" info model/box.obj
+    taken_over reads model/box.obj
     refused 2 'taken over: 4 threads, 48 calls, let through: none'
 }
 

@@ -28,35 +28,27 @@ run_commands() {
     done <commands
 }
 
-@test "every scene of docs/scene.md bakes, or voxelizes where it has no receivers" {
-    scenes_of scene.md example
-    [ -e example01.json ]
-    for scene in example*.json; do
-        if grep -q '"receivers"' "$scene"; then
-            # Levels sets that an example names are made first.
-            for vdb in $(grep -o '"vdb": *"[^"]*"' "$scene" | grep -o '[^"]*\.vdb'); do
-                [ -e "$vdb" ] || "$VDBSHADE" voxelize seeds.json -o "$vdb" --voxel-size 0.1 --quiet
-            done
-            shade bake "$scene" --quiet
+@test "every scene of docs/scene.md and docs/flat.md bakes, or voxelizes where it has no receivers" {
+    scenes_of scene.md bake
+    scenes_of flat.md flat
+    [ -e bake01.json ] && [ -e flat02.json ] || fail "no scenes"
+    local scene command vdb output
+    for scene in bake??.json flat??.json; do
+        command=${scene:0:4}
+        for vdb in $(grep -o '"vdb": *"[^"]*"' "$scene" | grep -o '[^"]*\.vdb'); do
+            [ -e "$vdb" ] || "$VDBSHADE" voxelize seeds.json -o "$vdb" --voxel-size 0.1 --quiet
+        done
+        if [ $command = bake ] && ! grep -q '"receivers"' "$scene"; then
+            succeed voxelize "$scene" -o "${scene%.json}.vdb" --quiet
         else
-            shade voxelize "$scene" -o "${scene%.json}.vdb" --quiet
+            succeed $command "$scene" --quiet
         fi
-        done_well || fail "$scene: $(cat "$scene")"
         for output in $(grep -o '"output": *"[^"]*"' "$scene" | sed 's/.*"\([^"]*\)"$/\1/'); do
             [ -s "$output" ] || fail "$scene: no $output"
         done
     done
 }
 
-@test "every flat scene of docs/flat.md" {
-    scenes_of flat.md flat
-    [ -e flat02.json ]
-    for scene in flat??.json; do
-        shade flat "$scene" --quiet
-        done_well || fail "$scene: $(cat "$scene")"
-        [ -s "$(sed -n 's/.*"output": *"\([^"]*\)".*/\1/p' "$scene")" ] || fail "$scene: no output"
-    done
-}
 
 @test "every command of docs/query.md" {
     printf '0.5,0.001,0.5,0,1,0\n-1,0.001,1,0,1,0\n' >points.csv
@@ -129,35 +121,29 @@ block() {
         fail "vdbshade.h"
 }
 
-# missing [PURPOSE]: what tools/setup asks for on a system where nothing is installed.
-missing() {
-    mkdir -p stubs
-    printf '#!/bin/sh\nexit 1\n' | tee stubs/dpkg-query >stubs/sudo
-    printf '#!/bin/sh\necho 1000\n' >stubs/id
-    chmod +x stubs/*
-    run env PATH="$PWD/stubs:$PATH" "$BATS_TEST_DIRNAME/../../tools/setup" "$@"
+# installs PURPOSE PACKAGE … -- PACKAGE …: on an empty system tools/setup asks for the first packages, and not for the others.
+installs() {
+    local package wanted=1 asked
+    run env PATH="$PWD/stubs:$PATH" "$BATS_TEST_DIRNAME/../../tools/setup" "$1"
+    [ "$status" -eq 2 ] || fail "expected exit code 2"
+    for package in "${@:2}"; do
+        [ "$package" != -- ] || { wanted=0 && continue; }
+        asked=0
+        [[ " $output " != *" $package "* ]] || asked=1
+        [ $asked -eq $wanted ] || fail "$1: $package"
+    done
 }
 
 @test "the demo installs what building and baking need; only the thorough tests need browsers, Slurm and clang-tidy" {
-    local tools=$BATS_TEST_DIRNAME/../../tools package
-    grep -qx 'tools/setup run' "$tools/demo" || fail "tools/demo has another set-up"
-    missing run
-    [ "$status" -eq 2 ] || fail "expected exit code 2"
-    [[ $output == *" cmake "*" libopenvdb-dev "* ]] || fail "what building takes is missing"
-    for package in slurmd chromium doxygen clang-tidy lintian bats libcmocka-dev python3-numpy gcovr; do
-        [[ " $output " != *" $package "* ]] || fail "$package is installed"
-    done
-    missing test
-    for package in cmake bats libcmocka-dev python3-numpy; do
-        [[ " $output " == *" $package "* ]] || fail "$package is not installed"
-    done
-    for package in slurmd chromium doxygen clang-tidy lintian gcovr; do
-        [[ " $output " != *" $package "* ]] || fail "$package is installed for the quick tests"
-    done
-    missing all
-    for package in cmake bats slurmd chromium doxygen clang-tidy lintian gcovr; do
-        [[ " $output " == *" $package "* ]] || fail "$package is not installed"
-    done
-    missing tests
-    [[ $status -eq 2 && $output == *"unknown purpose 'tests'"* ]] || fail "a wrong purpose is taken"
+    local thorough=(slurmd chromium doxygen clang-tidy lintian gcovr) tests=(bats libcmocka-dev python3-numpy)
+    mkdir stubs
+    printf '#!/bin/sh\nexit 1\n' | tee stubs/dpkg-query >stubs/sudo
+    printf '#!/bin/sh\necho 1000\n' >stubs/id
+    chmod +x stubs/*
+    grep -qx 'tools/setup run' "$BATS_TEST_DIRNAME/../../tools/demo" || fail "tools/demo has another set-up"
+    installs run cmake libopenvdb-dev -- "${tests[@]}" "${thorough[@]}"
+    installs test cmake "${tests[@]}" -- "${thorough[@]}"
+    installs all cmake "${tests[@]}" "${thorough[@]}"
+    installs tests
+    [[ $output == *"unknown purpose 'tests'"* ]] || fail "a wrong purpose is taken"
 }

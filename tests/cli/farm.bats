@@ -89,7 +89,7 @@ needs_slurm() {
     [ "$(id -u)" -eq 0 ] || skip "slurmd is started by root alone"
 }
 
-@test "a bake on Slurm comes to what one bake does, though a node's daemon is killed in the middle" {
+@test "a bake on Slurm has the bytes of one bake although a node's daemon is killed" {
     needs_slurm
     bake=(bake box.obj --sun 0.3,1,0.2 --sun-angle 5 --ao 1 --size 256)
     "$VDBSHADE" "${bake[@]}" -o one.exr --quiet
@@ -120,7 +120,7 @@ PROGRAM
     [ -n "$array" ] && [ -n "$merge" ]
 }
 
-@test "submit asks for what the estimate says, and refuses what it cannot share out" {
+@test "submit asks for the estimated memory, and refuses commands that have no parts" {
     mkdir bin
     printf '#!/bin/sh\nprintf "%%s\\n" "$*" >>asked\necho 7\n' >bin/sbatch
     chmod +x bin/sbatch

@@ -12,7 +12,7 @@ prepare() {
 JSON
 }
 
-@test "the channels of a map, and how much of it is lit" {
+@test "a map has shadow, light and coverage as its geometry says" {
     succeed flat wall.json -o out.exr --quiet
     # the wall covers 1.9 to 2.1 … of 16: x from -2 to 0 and 0.2 high, so 3 or 4 rows of 64, half of them
     holds "1 - $(mean_of out.exr A) < 0.032 && 1 - $(mean_of out.exr A) > 0.022"
@@ -23,21 +23,7 @@ JSON
     holds "$(values_of out.exr irradiance.R | cut -d' ' -f3) > 1.8 && $(values_of out.exr irradiance.R | cut -d' ' -f3) <= 2"
 }
 
-@test "any number of threads gives the same file" {
-    cat >text.json <<JSON
-{"region": [-3, -1, 3, 2], "size": [96, 48], "supersample": 2,
- "casters": [{"text": "vdbshade", "font": "$FONT", "height": 1, "align": "center"},
-             {"mask": "emblem.png", "size": 1, "translate": [2, 1.2], "rotate_deg": 20}],
- "lights": [{"name": "lamp", "type": "disc", "position": [0, 1.5], "radius": 0.2, "reach": 3},
-            {"name": "torch", "type": "spot", "position": [-3, 1], "direction": [1, -0.2], "radius": 0.1,
-             "inner_deg": 10, "outer_deg": 20}]}
-JSON
-    succeed flat text.json -o one.exr --threads 1 --quiet
-    succeed flat text.json -o seven.exr --threads 7 --quiet
-    cmp one.exr seven.exr
-}
-
-@test "options go over the scene's" {
+@test "options override the scene's keys" {
     succeed_saying "small.png: 32 × 16, 2 lights" -- flat wall.json -o small.png --size 32x16 --bits 8 --pack R=shadow.sun --stats stats.json
     info_tells small.png "32 × 16"
     grep -q '"texels": 512' stats.json
@@ -52,44 +38,31 @@ spoil() {
     sed "s|$1|$2|" wall.json >bad.json
 }
 
-@test "bad scenes" {
-    local from to
-    while IFS='|' read -r from to words; do
-        spoil "$from" "$to"
-        eval "refuses $words -- flat bad.json -o out.exr"
-    done <<'LIST'
-"shape": "box", "half_size": \[1.5, 0.1\]|"mask": "none.png", "size": 1|3 'casters[0]' none.png
-LIST
+@test "a missing mask is refused with the caster's number" {
+    spoil '"shape": "box", "half_size": \[1.5, 0.1\]' '"mask": "none.png", "size": 1'
+    refuses 3 'casters[0]' none.png -- flat bad.json -o out.exr
+    untouched out.exr
+}
+
+@test "flat scenes are sent to flat, and scenes with receivers to bake" {
     refuse_each <<'LIST'
-3 none.json | flat none.json -o out.exr
-2 wall.json 'no output' | flat wall.json
-2 seeds.json | flat "$ASSETS/seeds.json" -o out.exr
-2 wall.json region | bake wall.json -o out.exr
+2 seeds.json "vdbshade bake" | flat "$ASSETS/seeds.json" -o out.exr
+2 wall.json:1 "vdbshade flat" | bake wall.json -o out.exr
+2 wall.json:1 "vdbshade flat" | query wall.json --points points.csv --distance -o out.csv
 LIST
     untouched out.exr
 }
 
-@test "bad options" {
+@test "maps over the memory limit are refused" {
     refuse_each flat wall.json -o <<'LIST'
-2 --size | out.exr --size 70000
-2 --supersample | out.exr --supersample 0
-2 out.txt | out.txt
-3 none/out.exr | none/out.exr
-2 wall.json | wall.json
 4 out.exr | out.exr --size 8192 --memory-limit 64MiB
 4 | out.exr --size 2048x64 --memory-limit 2MiB
 LIST
     untouched out.exr
 }
 
-@test "an output that is a caster's picture" {
+@test "flat does not replace a caster's picture" {
     spoil '"shape": "box", "half_size": \[1.5, 0.1\]' '"mask": "emblem.png", "size": 1'
     refuses 2 emblem.png -- flat bad.json -o emblem.png
     succeed flat bad.json -o out.exr
-}
-
-@test "interrupted, the old output stays" {
-    spoil '"size": 64' '"size": 8192'
-    interrupted INT 0 flat bad.json -o out.exr --supersample 16
-    untouched out.exr
 }

@@ -28,17 +28,6 @@ write_bake() {
         "receivers": [{%s, "output": "%s.exr"}]%s}\n' "$2" "${4:-\"mesh\": \"box.obj\", \"size\": 16}" "$(basename "$1" .json)" "${3:+, $3}" >"$1"
 }
 
-# Sets rest to options without those of a sun.
-no_sun() {
-    rest=()
-    while [ $# -gt 0 ]; do
-        case $1 in
-        --sun | --sun-angle) shift 2 ;;
-        *) rest+=("$1") && shift ;;
-        esac
-    done
-}
-
 # A unit cube, closed, each face with its own sixth of the UV square.
 write_box() {
     {
@@ -95,8 +84,9 @@ show_gltf() {
     python3 "$BATS_TEST_DIRNAME/gltf.py" show "$@"
 }
 
-# A small bake of box.obj, which is there: quick, and right in every respect.
-SMALL=(--sun 0.3,1,0.2 --sun-angle 5 --size 32 --resolution 24)
+# A small bake of box.obj: quick, and right in every respect. COARSE goes with scenes, which have a sun of their own.
+COARSE=(--size 32 --resolution 24)
+SMALL=(--sun 0.3,1,0.2 --sun-angle 5 "${COARSE[@]}")
 
 shade() {
     run --separate-stderr "$VDBSHADE" "$@"
@@ -276,26 +266,6 @@ refuse_each() {
 # limited LIMIT ARG …: runs the program with a limit of ulimit, such as "-f 4".
 limited() {
     run --separate-stderr bash -c 'ulimit $1; shift; exec "$@"' bash "$1" "$VDBSHADE" "${@:2}"
-}
-
-# interrupted SIGNAL SECONDS ARG …: runs the program until it says something, waits, and sends the signal, which must end it. Sets
-# took, the time that it takes to end, ms. A shell's background jobs ignore SIGINT until the program has its own handler, so an earlier
-# signal would be lost. A run that is not interrupted ends by its limit of processor seconds.
-interrupted() {
-    local pid start
-    rm -f err.txt
-    (ulimit -t 60 && exec "$VDBSHADE" "${@:3}" --progress 2>err.txt) &
-    pid=$!
-    until [ -s err.txt ]; do
-        sleep 0.01
-    done
-    sleep "$2"
-    kill -s "$1" "$pid"
-    start=$(date +%s%N)
-    status=0
-    wait "$pid" || status=$?
-    took=$((($(date +%s%N) - start) / 1000000)) output= stderr=$(cat err.txt)
-    [ "$status" -eq 130 ] || fail "expected 130"
 }
 
 # unless_sanitized REASON: skips the test if the program is built with a sanitizer.

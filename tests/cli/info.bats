@@ -30,7 +30,7 @@ load helper
     prints 'c?[31m: failed' 'a?[31m.vdb: the bake ended'
 }
 
-@test "a file's unit and its size in metres are told, and --unit overrules by a name or in metres" {
+@test "info prints a file's unit and its size in metres, and --unit overrides it" {
     info_tells "$MODELS/scene.fbx" "unit: 0.01 m; bounds are in metres" "bounds: 0 2 -3 to 2 4 -1"
     info_tells "$MODELS/scene.obj" "unit: none"
     succeed_printing "bounds: 0 200 -300 to 200 400 -100" -- info --unit m "$MODELS/scene.fbx"
@@ -68,19 +68,6 @@ sys.exit("\n".join(one for one in sys.argv[1:] if not eval(one)) or 0)' "${@:2}"
     json_has box.vdb 'root["grids"][0]["class"] == "level set"' '"box.obj" in root["grids"][0]["attributes"]["vdbshade_input_0"]'
     json_has "$ASSETS/seeds.json" 'root["casters"][0]["type"] == "sdf"' 'root["receivers"][0]["size"] == [512, 512]'
     refuses 3 none.obj -- info none.obj --json
-}
-
-@test "unknown files are refused with advice" {
-    sed 's/"asset"/"extensionsRequired":["KHR_node_visibility"],"asset"/' "$MODELS/scene.gltf" >packed.gltf
-    cp "$MODELS/scene.bin" .
-    refuses 2 "KHR_node_visibility" -- info packed.gltf
-    refused 2 "only the visible nodes"
-    cp "$MODELS/scene.gltf" alone.gltf && rm scene.bin
-    refuses 3 "scene.bin': cannot be read: No such file" -- info alone.gltf
-    printf 'BLENDER-v304' >a.blend
-    refuses 2 "export it as GLB" -- info a.blend
-    printf 'anything' >a.x3d
-    refuses 2 "GLB" -- info a.x3d
 }
 
 @test "a file with blanks in its name is read in every format" {

@@ -26,8 +26,9 @@ said() {
     sed -n "/\"$1\": {/,/}/s/.*\"$2\": \"\{0,1\}\([^\",]*\).*/\1/p" s.json
 }
 
-@test "with nothing said meshes are baked by exact, and it is said" {
+@test "meshes are baked by exact by default, and the summary says so" {
     succeed_saying "shadow exact, AO exact, max error 0.02" -- bake box.obj "${SMALL[@]}" --ao 0.5 --stats s.json -o a.exr
+    grep -q '"refined": [0-9]' s.json && grep -q '"certified_share": [0-9]' s.json || fail "$(cat s.json)"
     for kind in shadow ao; do
         [ "$(said $kind method)" = exact ] || fail "$(cat s.json)"
         holds "$(said $kind estimated_rmse) <= $(said $kind max_error)"
@@ -44,9 +45,11 @@ said() {
     write_bake sphere.json '{"vdb": "ball.vdb"}'
     succeed_saying "shadow adaptive, max error 0.02" -- bake sphere.json --stats s.json
     [ "$(said shadow method)" = adaptive ] || fail "$(cat s.json)"
+    succeed bake sphere.json --method cone --stats s.json
+    grep -q '"estimated_rmse": null' s.json || fail "$(cat s.json)"
 }
 
-@test "an error that a limit of rays does not keep is told" {
+@test "a warning says that --rays is too small for --max-error" {
     succeed_saying "above the limit of 0.003: 8 rays are too few" -- bake fence.obj --size 64 --resolution 32 --sun 0.3,1,0.5 \
         --sun-angle 20 --max-error 0.003 --rays 8 --stats s.json -o a.exr
     holds "$(said shadow max_error) <= $(said shadow estimated_rmse)"
@@ -56,7 +59,7 @@ said() {
     holds "$(said shadow estimated_rmse) <= 0.003"
 }
 
-@test "the error of voxels is measured and printed, and exact has none" {
+@test "a warning says that voxels are too coarse for --max-error, and exact has no such error" {
     succeed_saying "shadow: the estimated error is " "above the limit of 0.01: " "comes from voxels of" "--method exact has none" -- \
         bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive --max-error 0.01 --stats s.json -o a.exr
     [[ $stderr == *"estimated error: shadow "*"(the voxels' "* ]] || fail "$stderr"
@@ -67,7 +70,7 @@ said() {
     holds "$(said shadow estimated_rmse) <= 0.01"
 }
 
-@test "any number of threads tells the same error" {
+@test "the estimated error is the same for any number of threads" {
     local bake=(bake fence.obj --size 96 --resolution 32 --sun 0.3,1,0.5 --sun-angle 2 --method adaptive -o a.exr --quiet)
     shade "${bake[@]}" --stats whole.json
     succeed "${bake[@]}" --stats one.json --threads 1
@@ -91,8 +94,7 @@ said() {
 # by_rays METHOD: a lone box by the method is lit, dark and open, and the file names the method's rays.
 by_rays() {
     write_scene box.json box.obj '"sampler": "blue", "frame": 1'
-    no_sun "${SMALL[@]}"
-    succeed bake box.json "${rest[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --quiet \
+    succeed bake box.json "${COARSE[@]}" --ao 0.5 --method "$1" --ao-method "$1" --rays 8 --quiet \
         --stats stats.json -o "$1.exr"
     grep -q '"rays": [1-9]' stats.json || fail "no rays: $(cat stats.json)"
     info_tells "$1.exr" "channel 'ao': min 1, mean 1, max 1" "channel 'shadow.sun': min 0, mean 0.5, max 1"
@@ -100,7 +102,7 @@ by_rays() {
     grep -qx "vdbshade_ao: $1 within 0.5, .*8 rays, blue, frame 1" <<<"$output" || fail "what rays of AO?"
 }
 
-@test "methods by rays obey --rays, and --max-error alone gives what adaptive gives" {
+@test "methods by rays obey --rays, and --max-error chooses adaptive" {
     for method in rays adaptive exact; do
         by_rays $method
     done
@@ -109,27 +111,19 @@ by_rays() {
     same_values asked.exr named.exr
 }
 
-@test "exact traces shapes and level sets as well as meshes" {
+@test "exact traces shapes, masks and level sets as well as meshes" {
     printf '{"casters": [{"sdf": {"shape": "torus", "radius": 0.6, "tube_radius": 0.2, "translate": [0, 2, 0]}}]}' >ring.json
     "$VDBSHADE" voxelize ring.json --resolution 48 --quiet -o ring.vdb
-    write_bake mixed.json '{"mesh": "box.obj"}, {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}, {"vdb": "ring.vdb"}' \
+    write_bake mixed.json '{"mesh": "box.obj"}, {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}, {"vdb": "ring.vdb"},
+        {"mask": "'$ASSETS'/emblem.png", "size": 1, "thickness": 0.2}' \
         '"method": "exact"'
     succeed_saying "no voxels" "shadow exact" -- bake mixed.json
 }
 
-@test "--error bakes what error is left, for methods that know it" {
+@test "--error bakes the estimated error, for methods that have one" {
     succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method cones --error --quiet -o out.exr
     info_tells out.exr "channel 'error.sun'"
     [[ $output != *"channel 'error.ao'"* ]] || fail "cones know no error"
     succeed bake box.obj "${SMALL[@]}" --ao 0.5 --method adaptive --ao-method adaptive --error --irradiance --quiet -o all.exr
     info_tells all.exr "11 channels" "'A'" "'ao'" "'error.ao'" "'error.sun'" "'irradiance.R'" "'shadow.sun'" # 8, and R, G and B
-}
-
-@test "the statistics say what adaptive methods know of themselves" {
-    succeed bake box.obj "${SMALL[@]}" --method adaptive --quiet --stats stats.json -o out.exr
-    for key in rays refined certified_share estimated_rmse; do
-        grep -q "\"$key\": [0-9]" stats.json || fail "no $key: $(cat stats.json)"
-    done
-    succeed bake box.obj "${SMALL[@]}" --method cone --quiet --stats stats.json -o out.exr
-    grep -q '"estimated_rmse": null' stats.json
 }

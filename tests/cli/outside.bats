@@ -78,7 +78,7 @@ shade() {
     succeed info links/d.gltf
 }
 
-@test "nothing is told of a file outside that a model does not use" {
+@test "provenance names no file outside that a model does not use" {
     mkdir inside
     cp "$MODELS/scene.bin" inside
     echo secret >secret

@@ -11,7 +11,7 @@ prepare() {
     bake=(bake box.obj "${SMALL[@]}" --quiet -o out.exr)
 }
 
-@test "too few descriptors are told as such, with the way to do without" {
+@test "too few file descriptors are an error that suggests --sandbox off" {
     old_output out.exr
     local most
     for most in 10 12 14 16; do
@@ -24,7 +24,7 @@ prepare() {
     done_well
 }
 
-@test "a system without memfd_create, and one that gives fewer threads than OpenVDB's libraries begin, are told" {
+@test "the error names a missing memfd_create, and too few threads for OpenVDB's libraries" {
     old_output out.exr
     LD_PRELOAD=$calls REFUSE_MEMFD=1 shade "${bake[@]}"
     refused 4 "box.obj: cannot start the process that reads it, " "Function not implemented" --sandbox off
@@ -53,7 +53,7 @@ prepare() {
     done
 }
 
-@test "threads that were joined and count for a while yet are waited for" {
+@test "a bake waits for joined threads that the system still counts" {
     local most
     for most in 6 8 16; do
         LD_PRELOAD=$calls REFUSE_THREADS=$most LINGER=200 succeed "${bake[@]}" --threads 8
@@ -72,7 +72,7 @@ prepare() {
     [ "$refused" -gt 4 ] || fail "$refused refused"
 }
 
-@test "whichever allocation is refused, the program says so and leaves the old output, or the output is whole" {
+@test "any allocation may fail: the error says so and the old output stays" {
     local what out n program words refused=0
     echo "0.5,1.2,0.5" >points.csv
     "$VDBSHADE" voxelize box.obj --resolution 6 --quiet -o made.vdb
@@ -101,12 +101,11 @@ prepare() {
     [ "$refused" -gt 100 ] || fail "$refused refused"
 }
 
-@test "statistics that cannot be written are told before an image is replaced" {
+@test "statistics that cannot be written are an error before an image is replaced" {
     old_output out.exr
     local name
-    name=$(printf 'x%.0s' {1..256})
     mkdir closed
-    for name in "$name" /proc/stats.json closed; do
+    for name in "$(printf 'x%.0s' {1..256})" /proc/stats.json closed; do
         shade "${bake[@]}" --stats "$name"
         refused 3 "$name: cannot be written: "
         untouched out.exr
@@ -123,7 +122,7 @@ synced() {
     rm syncs
 }
 
-@test "every output is on the disk before it is in its place, and its folder after" {
+@test "every output is synced before it is renamed, and its folder after" {
     mkdir there
     export LD_PRELOAD=$calls TELL_SYNCS=$PWD/syncs
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o there/out.exr
@@ -142,20 +141,14 @@ synced() {
     synced page.html
 }
 
-@test "the reason is told however long a path is" {
-    local part long one name=
-    part=$(printf 'd%.0s' {1..200})
-    for _ in {1..6}; do
-        name=$name$part/
-    done
-    for long in "$name" "$name$name$name"; do
-        for one in obj exr vdb json; do
-            shade info "begin/${long}x.$one"
-            refused 3 "begin/ddd" "x.$one: " "No such file or directory"
+@test "an error ends with its reason however long the path is" {
+    local part long ending
+    part=$(printf 'd%.0s' {1..200})/$(printf 'd%.0s' {1..200})/$(printf 'd%.0s' {1..200})/
+    for long in "begin/$part$part" "begin/$part$part$part$part$part$part"; do
+        for ending in obj exr vdb json; do
+            refuses 3 "begin/ddd" "x.$ending: " "No such file or directory" -- info "${long}x.$ending"
         done
-        shade bake box.obj "${SMALL[@]}" --quiet -o "begin/${long}x.exr"
-        refused 3 "begin/ddd" "x.exr: cannot be written: "
-        shade bake box.obj "${SMALL[@]}" --quiet -o out.exr --stats "begin/${long}x.json"
-        refused 3 "begin/ddd" "x.json: cannot be written: "
+        refuses 3 "begin/ddd" "x.exr: cannot be written: " -- bake box.obj "${SMALL[@]}" --quiet -o "${long}x.exr"
+        refuses 3 "begin/ddd" "x.json: cannot be written: " -- "${bake[@]}" --stats "${long}x.json"
     done
 }

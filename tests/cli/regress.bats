@@ -31,7 +31,7 @@ clean() {
     [ -z "$(find . -name 'vdbshade-regress-*')" ] || fail "bakes were left behind"
 }
 
-@test "a scene without a golden bake is told, and made by --update" {
+@test "a scene without a golden bake fails, and --update makes one" {
     ends 1 regress scenes
     [[ $output == "box: not alike"*"no golden bake scenes/golden/box.exr"*"--update"* ]] || fail "no hint"
     [ ! -e scenes/golden ] || fail "made a golden bake"
@@ -88,7 +88,7 @@ JSON
     [[ $stderr == *"nothing says what 'box' writes"* && $output == "box: failed"* ]] || fail "not told"
 }
 
-@test "a scene that cannot be baked fails alone, with the code of its bake" {
+@test "a scene that cannot be baked fails without the others, with its exit code" {
     scene broken 5
     sed -i 's/"mesh": "box.obj", "size"/"mesh": "gone.obj", "size"/' scenes/broken.json
     ends 3 regress scenes --update
@@ -120,7 +120,7 @@ JSON
     "$VDBSHADE" compare scenes/golden/box.exr new/box.exr --quiet || fail "bakes"
 }
 
-@test "a scene that cannot be read fails by itself, a folder that is not there or has none of what is asked for all" {
+@test "a scene that cannot be read fails without the others; a missing or empty folder is an error" {
     succeed regress scenes --update
     echo '{"casters": [' >scenes/aa.json
     scene other 8

@@ -6,7 +6,8 @@ prepare() {
     ln -s "$ASSETS/terrain.png" "$ASSETS/cloister.glb" .
 }
 
-CLOISTER=(cloister.glb --sun -0.5,0.8,-0.6 --sun-angle 10 --ao 2 --size 64x256)
+TALL=(--ao 2 --size 64x256)
+CLOISTER=(cloister.glb --sun -0.5,0.8,-0.6 --sun-angle 10 "${TALL[@]}")
 
 # parts OUT N "I …" INPUT [options]: bakes all parts, or those that are named.
 parts() {
@@ -30,43 +31,37 @@ one_is() {
     done
 }
 
-@test "2, 3, 7 and 64 parts of a lightmap are one bake, byte by byte" {
+@test "2, 3, 7 and 64 merged parts of a lightmap are the bytes of one bake" {
     one_is out.exr "2 3 7 64" "${CLOISTER[@]}"
     no_leftovers
 }
 
-@test "seams, padding, shared rays, filled texels and every channel are those of one bake" {
-    local options=(--irradiance --bent-normals world --sky y --error)
-    write_scene all.json "${CLOISTER[0]}" '"invalid": true, "tint": "quadratic"'
-    no_sun "${CLOISTER[@]:1}"
-    one_is out.exr 3 all.json "${rest[@]}" "${options[@]}" --padding auto
-    one_is out.png 3 "${CLOISTER[@]}" --seams fix --padding auto
-    one_is out.exr 3 "${CLOISTER[@]}" --padding 70 --supersample 2 --method adaptive --ao-method adaptive --resolution 48
-    one_is out.exr 3 "${CLOISTER[@]}" --method cone --ao-method cones --padding 0 --resolution 48
+@test "merged parts have the seams, padding, shared AO and channels of one bake" {
+    local all=(--irradiance --ambient 0.3,0.2,0.1 --bent-normals tangent --sky -z --error) adaptive="--method adaptive --ao-method adaptive"
+    write_scene all.json cloister.glb '"invalid": true, "tint": "quadratic"'
+    write_scene 2.json cloister.glb '' '"ao_spacing": 2'
+    write_scene 8.json cloister.glb '' '"ao_spacing": 8'
+    local out n options
+    while read -r out n options; do
+        # shellcheck disable=SC2086 # words
+        one_is "$out" "$n" $options
+    done <<LIST
+out.exr 3 all.json ${TALL[*]} --irradiance --bent-normals world --sky y --error --padding auto
+out.exr 5 8.json ${TALL[*]} --error
+out.exr 2 2.json ${TALL[*]} --max-error 0.05
+out.exr 5 ${CLOISTER[*]} $adaptive --resolution 48 --error --irradiance --bent-normals tangent --sky y
+out.exr 3 ${CLOISTER[*]} $adaptive --resolution 48 --padding 70 --supersample 2
+out.exr 3 ${CLOISTER[*]} --method cone --ao-method cones --padding 0 --resolution 48
+out.png 3 ${CLOISTER[*]} --seams fix --padding auto
+out.exr 2 ${CLOISTER[*]} --irradiance --max-error 0.05
+out.exr 5 ${CLOISTER[*]} --irradiance --ambient 0.3,0.2,0.1
+out.exr 2 ${CLOISTER[*]} --sky y --seams fix
+out.exr 5 ${CLOISTER[*]} ${all[*]} --padding 20
+out.glb 7 ${CLOISTER[*]} ${all[*]}
+LIST
 }
 
-@test "AO that texels share is shot by one part and finished by merge, of any spacing and error, with its error" {
-    for spacing in 2 8; do
-        write_scene $spacing.json "${CLOISTER[0]}" '' "\"ao_spacing\": $spacing"
-    done
-    write_scene 4.json "${CLOISTER[0]}"
-    no_sun "${CLOISTER[@]:1}"
-    for options in "8.json --error" "2.json --max-error 0.05" "4.json --max-error 0.008" \
-        "4.json --method adaptive --ao-method adaptive --resolution 48 --error"; do
-        one_is out.exr "2 5" $options "${rest[@]}"
-    done
-}
-
-@test "merge finishes the channels made of AO: irradiance with and without ambient light, bent normals in both spaces, the sky" {
-    local all=(--irradiance --ambient 0.3,0.2,0.1 --bent-normals tangent --sky -z --error)
-    for options in "--irradiance --max-error 0.05" "--irradiance --ambient 0.3,0.2,0.1" "--bent-normals world" "--sky y --seams fix" \
-        "${all[*]} --padding 20" "--irradiance --bent-normals tangent --sky y --method adaptive --ao-method adaptive --resolution 48"; do
-        one_is out.exr "2 5" "${CLOISTER[@]}" $options
-    done
-    one_is out.glb "2 7 64" "${CLOISTER[@]}" "${all[@]}"
-}
-
-@test "parts of a lit asset, a terrain, separate objects and a scene of several lightmaps are one bake" {
+@test "merged parts of assets, terrains, objects and several lightmaps are the bytes of one bake" {
     one_is out.glb 3 "${CLOISTER[@]}"
     printf '%s' '{"lights": [{"name": "sun", "type": "directional", "direction": [-1, 0.5, -0.3], "angle_deg": 5}], "ao": {"distance": 2},
         "receivers": [{"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 64, "output": "out.exr"}]}' >terrain.json
@@ -91,13 +86,13 @@ one_is() {
     diff -r one2 v1.2
 }
 
-@test "seams between pages are fixed where parts are put together, too, and objects have their own" {
+@test "merge fixes seams between pages, and between objects" {
     local ring=("$ASSETS/smooth.glb" --unwrap always --texels-per-unit 30 --size 128 --sun 0.5,0.5,0.1 --sun-angle 20 --ao 0.3) # a ring on two pages
     one_is out.glb 3 "${ring[@]}"
     one_is out.glb 2 "${CLOISTER[@]}" --unwrap always --texels-per-unit 9 --size 128 --per-object
 }
 
-@test "a lightmap that memory has no room for is merged to the same bits" {
+@test "a lightmap over the memory limit is merged to the same bits" {
     options=("${CLOISTER[@]}" --size 2048x128 --irradiance --bent-normals tangent --sky y --error)
     one_is out.exr "" "${options[@]}"
     parts out.exr 3 "" "${options[@]}"
@@ -108,7 +103,7 @@ one_is() {
     cmp one/out.exr out.exr
 }
 
-@test "statistics, pictures of what is invalid, and pages are made of all parts" {
+@test "merge writes statistics and --invalid of all parts" {
     one_is out.exr "" "${CLOISTER[@]}" --sky y --stats one.json --invalid one.png
     parts out.exr 3 "" "${CLOISTER[@]}" --sky y
     "$VDBSHADE" merge out.exr --quiet --stats all.json --invalid all.png
@@ -142,7 +137,7 @@ one_is() {
     untouched out.exr
 }
 
-@test "a part of other inputs, options, another version or another bake is named, with what differs" {
+@test "a part of another bake, input, option or version is refused with the difference" {
     old_output out.exr
     parts out.exr 2 1 box.obj "${SMALL[@]}"
     parts out.exr 2 2 box.obj "${SMALL[@]}" --max-error 0.1
@@ -187,7 +182,7 @@ one_is() {
     [ ! -e kept.json ]
 }
 
-@test "a part that cannot be written leaves none" {
+@test "a part that cannot be written leaves no file" {
     refuses 3 "none" -- bake box.obj "${SMALL[@]}" -o none/out.exr --shard 1/2
     for text in 0/2 3/2 1 1/ /2 1/2/3 a/b 1/20000 -1/2; do
         refuses 2 "--shard '$text': expected I/N" -- bake box.obj "${SMALL[@]}" -o out.exr "--shard=$text"

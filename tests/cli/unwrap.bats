@@ -2,8 +2,6 @@
 load helper
 
 LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
-# As SMALL, without a size.
-FIT=(--sun 0.3,1,0.2 --resolution 24)
 
 # The box without UVs, two boxes, and two of which the second is twice as large.
 prepare() {
@@ -20,12 +18,14 @@ prepare() {
     [[ $stderr != *warning* ]] || fail "a warning"
 }
 
-@test "positions, normals and triangles are the input's" {
+@test "an OBJ has the input's positions, normals and triangles, and a glTF one UV set more" {
     succeed unwrap "$ASSETS/cloister.glb" -o out.obj --quiet
     [ -z "$stderr" ] || fail "not quiet"
     shade info "$ASSETS/cloister.glb"
     info_tells out.obj "$(grep -o 'objects: .* triangles' <<<"$output")"
     [ "$(grep -c '^vn' out.obj)" -gt 100 ] || fail "no normals"
+    succeed unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
+    info_tells out.glb "UV sets: 2"
 }
 
 @test "pages are materials, and a density that does not fit names one that does" {
@@ -40,43 +40,17 @@ prepare() {
     [ "$(grep '^usemtl' out.obj | tr '\n' ' ')" = "usemtl page_0 usemtl page_1 " ] || fail "$(grep usemtl out.obj)"
     refuse_each unwrap two.obj -o out.obj <<'LIST'
 2 --pages | --atlas objects --pages 2
-2 --atlas objects | --atlas each
 2 --max-size --texels-per-unit | --max-size 64
 2 --max-size --size | --max-size 64 --size 32 --texels-per-unit 1
 LIST
 }
 
-@test "UVs that can serve are kept, and densities go by name" {
+@test "unwrap --keep keeps UVs that can serve, and --density goes by name" {
     succeed_saying "1 mesh kept their UVs" -- unwrap box.obj -o out.obj --size 128 --keep
     succeed unwrap box.obj -o out.obj --size 128 --density 'b*=0.5'
-    refuses 2 none "'box'" -- unwrap box.obj -o out.obj --density none=2
-    refuses 2 --density -- unwrap box.obj -o out.obj --density 3
 }
 
-@test "the file is the same for any number of threads, and unwrap writes glTF, too: the input with another lightmap set" {
-    for threads in 1 5; do
-        succeed unwrap "$ASSETS/smooth.glb" -o "$threads.obj" --size 256 --threads "$threads" --quiet
-    done
-    cmp 1.obj 5.obj || fail "they differ"
-    succeed unwrap "$ASSETS/cloister.glb" --size 256 -o out.glb
-    info_tells out.glb "UV sets: 2"
-}
-
-@test "bad options and places are refused" {
-    old_output out.obj
-    refuse_each unwrap <<'LIST'
-2 -o | box.obj
-2 'give -o OUT.obj, .glb or .gltf' out.ply | box.obj -o out.ply
-3 none/out.obj | box.obj -o none/out.obj
-2 box.obj | box.obj -o box.obj
-2 --padding | box.obj -o out.obj --padding -1
-2 --max-stretch | box.obj -o out.obj --max-stretch 1
-3 none.obj | none.obj -o out.obj
-LIST
-    untouched out.obj
-}
-
-@test "a mesh without lightmap UVs gets some for an asset; for an image it gets none unasked, and the error says how" {
+@test "an asset gets the UVs that its mesh lacks; an image needs --unwrap auto, and the error says so" {
     succeed bake bare.obj "${SMALL[@]}" --ao 1 -o lit.glb
     show_gltf lit.glb text | grep -q '"TEXCOORD_0".*"MOZ_lightmap"' || fail "no UVs, or no light"
     ends 2 bake bare.obj "${SMALL[@]}" -o x.exr
@@ -84,7 +58,7 @@ LIST
     succeed bake bare.obj "${SMALL[@]}" --unwrap auto -o x.exr
 }
 
-@test "UVs that can be baked are kept, always replaces them, and a density packs them anew" {
+@test "--unwrap auto keeps good UVs, always replaces them, and a density repacks them" {
     "$VDBSHADE" bake box.obj "${SMALL[@]}" -o plain.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap auto -o auto.exr --quiet
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --unwrap always -o always.exr --quiet
@@ -95,14 +69,7 @@ LIST
     holds "$(number_in many.json texels) >= 1536 && $(number_in many.json texels) <= 1850"
 }
 
-@test "objects that each fill the square are packed apart" {
-    shade bake two.obj "${SMALL[@]}" --size 64 -o x.exr
-    [ "$status" -ne 0 ] || fail "baked over each other"
-    succeed bake two.obj "${SMALL[@]}" --size 64 --unwrap auto -o x.exr --verbose
-    [[ $stderr != *"overlap"* ]] || fail "$stderr"
-}
-
-@test "a density fills as many pages as it takes, each with an image of its own" {
+@test "a density makes as many pages as it needs, with an image each" {
     local options=("${SMALL[@]}" --size 64 --unwrap always --texels-per-unit 20)
     succeed bake two.obj "${options[@]}" --irradiance --ambient 0.25,0.25,0.25 -o x.exr
     [ -s x.0.exr ] && [ -s x.1.exr ] && [ ! -e x.exr ] || fail "$(ls)"
@@ -112,7 +79,7 @@ LIST
     same x.1.exr y.1.exr
 }
 
-@test "a mesh that no page can hold lies on several, each triangle on one" {
+@test "a mesh too large for a page is laid out on several, and stays solid" {
     succeed bake box.obj "${SMALL[@]}" --size 32 --unwrap always --texels-per-unit 20 -o x.exr --stats x.json --verbose
     [ -s x.5.exr ] && [ ! -e x.6.exr ] || fail "$(ls)"
     # solid still, though it is cut in six
@@ -121,21 +88,21 @@ LIST
     holds "$(number_in x.json texels) >= 2400 && $(number_in x.json texels) <= 2904"
 }
 
-@test "info tells density and stretch of UVs, and what auto would do" {
+@test "info prints density and stretch of UVs, and what --unwrap auto would do" {
     succeed_printing "lightmap UVs: 36.12 texels a unit at 100 × 100, stretch 1.048" "--unwrap auto: bakes these UVs as they are" -- info box.obj --size 100
     info_tells two.obj "--unwrap auto: packs usable charts anew"
     info_tells bare.obj "--unwrap auto: packs usable charts anew, and makes those of other meshes"
     [[ $output != *"lightmap UVs"* ]] || fail "$output"
 }
 
-@test "of an atlas of objects each has the image that it has alone" {
+@test "each object of an atlas has the image that it has alone" {
     succeed bake uneven.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --per-object -o maps/
     [ "$(echo maps/*)" = "maps/box.exr maps/second.exr" ] || fail "$(echo maps/*)"
     succeed bake uneven.obj "${SMALL[@]}" --size 32 --ao 1 --unwrap always --receive second -o alone.exr
     same alone.exr maps/second.exr
 }
 
-@test "a scene names its images by objects, as small as their densities need" {
+@test "a scene writes images named by objects, as small as their densities allow" {
     cat >scene.json <<EOF
 {"casters": [{"mesh": "uneven.obj"}], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0]}],
  "receivers": [{"mesh": "uneven.obj", "output": "map.png", "unwrap": "always", "atlas": "objects",
@@ -154,7 +121,7 @@ EOF
     done
 }
 
-@test "densities go by name, and a pattern that means none is refused with the names" {
+@test "--density goes by name, and an unknown name is refused with the names there are" {
     local bake=(bake two.obj "${SMALL[@]}" --size 128 --unwrap always --texels-per-unit 8 --receive second) few many
     succeed "${bake[@]}" -o plain.exr --stats plain.json
     succeed "${bake[@]}" --density 'b*=3' --density 'sec*=2' -o dense.exr --stats dense.json
@@ -168,10 +135,9 @@ EOF
 LIST
 }
 
-@test "an asset of objects has a lightmap for each, and materials of its own where they show one" {
+@test "an asset of objects has a lightmap and materials for each" {
     write_scene fit.json uneven.obj '' '"atlas": "objects", "max_size": 128, "texels_per_unit": 8, "unwrap": "always"'
-    no_sun "${FIT[@]}"
-    succeed bake fit.json "${rest[@]}" --ao 1 --seams keep -o lit.gltf --exr all.exr
+    succeed bake fit.json --resolution 24 --ao 1 --seams keep -o lit.gltf --exr all.exr
     for file in lit.lightmap.box.png lit.lightmap.second.png lit.occlusion.second.png all.box.exr all.second.exr; do
         [ -s "$file" ] || fail "no $file: $(ls)"
     done
@@ -180,16 +146,16 @@ LIST
     info_tells lit.lightmap.box.png "64 × 32"
     info_tells lit.lightmap.second.png "64 × 64"
     # the values are those of the images
-    shade bake fit.json "${rest[@]}" --ao 1 --irradiance --ambient 0.25,0.25,0.25 -o images.exr
+    shade bake fit.json --resolution 24 --ao 1 --irradiance --ambient 0.25,0.25,0.25 -o images.exr
     same images.second.exr all.second.exr
     # and what is invalid has a picture for each, of pages too
-    succeed bake fit.json "${rest[@]}" --ao 1 -o lit.glb --invalid where.png
+    succeed bake fit.json --resolution 24 --ao 1 -o lit.glb --invalid where.png
     [ "$(echo where*)" = "where.0.lit.box.png where.1.lit.second.png" ] || fail "$(ls)"
-    succeed bake uneven.obj "${FIT[@]}" --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
+    succeed bake uneven.obj --sun 0.3,1,0.2 --resolution 24 --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png
     [ "$(echo page*)" = "page.0.lit.0.png page.1.lit.1.png" ] || fail "$(ls)"
 }
 
-@test "objects whose UVs each fill the square are lit as they are, with a lightmap for each" {
+@test "objects that each fill the UV square keep their UVs and get a lightmap each" {
     "$VDBSHADE" bake two.obj "${SMALL[@]}" --irradiance --ambient 0.25,0.25,0.25 --size 64 --per-object -o maps/ --quiet
     succeed bake two.obj "${SMALL[@]}" --size 64 --per-object --seams keep -o lit.glb --exr all.exr
     same maps/box.exr all.box.exr
@@ -200,8 +166,7 @@ LIST
 
 @test "options that exclude an atlas of objects or a largest size are refused" {
     write_scene fit.json two.obj '' '"max_size": 64, "unwrap": "always"'
-    no_sun "${FIT[@]}"
-    refuses 2 max_size texels_per_unit -- bake fit.json "${rest[@]}" -o x.exr
+    refuses 2 max_size texels_per_unit -- bake fit.json --resolution 24 -o x.exr
     refuses 2 pages -- bake two.obj "${SMALL[@]}" --per-object --pages 2 --unwrap always -o x.exr
     refuses 4 two.obj "'box'" "would fit" -- bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
 }
@@ -214,7 +179,7 @@ scattered() {
     }'
 }
 
-@test "charts that cover less than a fifth are warned of, with the option that helps" {
+@test "a warning about charts that cover less than a fifth names the option that helps" {
     local bake=(--ao 1 --ao-method taps --resolution 16 -o out.exr --size) few=("charts cover " " % of " "texels: ")
     # charts of the file's own: a tenth of the square
     printf 'v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nvt 0 0\nvt 0.4 0\nvt 0.4 0.25\nvt 0 0.25\nf 1/1 2/2 3/3 4/4\n' >tenth.obj
@@ -232,7 +197,7 @@ scattered() {
     [[ $stderr != *"charts cover"* ]] || fail "chosen: $stderr"
 }
 
-@test "of an OBJ the light is an image that materials name, and fits the UVs" {
+@test "an OBJ's light is an image that its materials name" {
     succeed bake bare.obj "${LIGHT[@]}" -o lit.obj
     no_leftovers
     [ "$(ls lit.*)" = $'lit.mtl\nlit.obj\nlit.preview.png' ] || fail "$(ls)"
@@ -260,7 +225,7 @@ scattered() {
     done
 }
 
-@test "pages are materials with an image each, and what does not receive is unlit" {
+@test "an OBJ has a material and an image for each page, and an unlit one for other objects" {
     succeed bake two.obj "${LIGHT[@]}" --size 32 --texels-per-unit 20 --unwrap always --no-receive second -o lit.obj
     pages=$(grep -c '^newmtl page' lit.mtl)
     [ "$pages" -gt 1 ] || fail "$(cat lit.mtl)"
@@ -272,7 +237,7 @@ scattered() {
     grep -q '^newmtl unlit' lit.mtl || fail 'no such material'
 }
 
-@test "OBJ outputs refuse what they cannot hold, and foreign files" {
+@test "an OBJ output refuses --view, and replaces no foreign .mtl" {
     printf 'newmtl red\n' >lit.mtl
     refuses 2 'lit.mtl: would be replaced, which vdbshade has not written' -- bake bare.obj "${LIGHT[@]}" -o lit.obj
     [ "$(cat lit.mtl)" = 'newmtl red' ] && [ ! -e lit.obj ] && [ ! -e lit.preview.png ] || fail "$(ls)"

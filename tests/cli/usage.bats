@@ -24,7 +24,7 @@ fits() {
     done
 }
 
-@test "every command has its own help within 100 columns, whose options fill their column, counted in characters" {
+@test "every command has help within 100 columns, wrapped as late as possible" {
     local LC_ALL=C.UTF-8 line text before
     for command in $(commands); do
         succeed_printing "Usage: vdbshade $command " -- "$command" --help
@@ -49,7 +49,7 @@ fits() {
     done
 }
 
-@test "the help of bake begins with the twelve options that most need, and names every one that holds for good" {
+@test "the help of bake begins with the twelve most used options, and has all stable ones" {
     succeed bake --help
     [ "$(grep -oE '^ {2,6}(-., )?--[a-z-]+' <<<"$output" | head -12 | sed 's/.*--//' | tr '\n' ' ')" = \
         "output sun sun-angle lights ao irradiance size unwrap per-object max-error view dry-run " ] || fail "others come first"
@@ -58,7 +58,7 @@ fits() {
     done
 }
 
-@test "no command, an unknown command or option, a missing value and what is too many are usage errors" {
+@test "unknown commands and options, missing values and extra words are usage errors" {
     shade
     refused 2 'no command'
     # an abbreviation is none, as the next version may have another option of that beginning
@@ -77,35 +77,85 @@ fits() {
 LIST
 }
 
-@test "numbers are read strictly" {
-    old_output out.exr
-    local option value values
-    while read -r option values; do
+@test "every command refuses values that are no numbers or out of range" {
+    local command option values value
+    while read -r command option values; do
         for value in $values; do
-            refuses 2 "$option" "$value" -- bake box.obj -o out.exr "${SMALL[@]}" "$option" "$value"
+            refuses 2 "$option" "$value" -- "$command" box.obj "$option" "$value" -o out.exr || fail "$command"
         done
     done <<'LIST'
---ao 0 -1 nan 1m 0x10
---ao-method ray
---rays 0 4097
---max-error 0 2
---sun 1,2 0,0,0 1,2,3,4 1,nan,3
---sun-angle 180 -1 inf
---voxel-size 0 -0.1 nan inf
---resolution 1 65537 24.5 99999999999999999999
---size 0 1000000 64x 64x0 -64
---uv-set -1 8
---supersample 0 17
---padding -1 4097
---bits 12
---threads 0 1025
---memory-limit -5 5T many
+bake --ao 0 -1 nan 1m 0x10
+bake --ao-method ray
+bake --rays 0 4097
+bake --max-error 0 2
+bake --sun 1,2 0,0,0 1,2,3,4 1,nan,3
+bake --sun-angle 180 -1 inf
+bake --voxel-size 0 -0.1 nan inf
+bake --resolution 1 65537 24.5 99999999999999999999
+bake --size 0 1000000 64x 64x0 -64
+bake --uv-set -1 8
+bake --supersample 0 17
+bake --padding -1 4097 all
+bake --seams stitch
+bake --bits 12
+bake --threads 0 1025
+bake --memory-limit -5 5T many
+compare --noise 1.5
+compare --reach 17
+flat --size 70000
+flat --supersample 0
+query --batch 0
+query --normals maybe
+render --camera nan,0,0 1,2
+render --fov 180
+render --up 0,0,0
+trade --budget 0
+trade --resolutions 1 64, 64;128
+trade --truth-rays 15
+unwrap --atlas each
+unwrap --density 3
+unwrap --max-stretch 1
+unwrap --padding -1
+view --uv-set -1 8 x
+volume --box 0,0,0,1,1 0,0,0,1,0,1 0,0,0,1,-1,1 0,0,nan,1,1,1 0,0,0,1,1,1,1 a
+volume --box-voxel-size 0 -1 nan 1x
+voxelize --voxel-size 0
 LIST
     refuses 2 --ao -- bake box.obj -o out.exr "${SMALL[@]}" --ao ''
-    untouched out.exr
+    [ ! -e out.exr ] || fail "an output beside the error"
 }
 
-@test "an unknown method is refused with the list of those there are, and what does not go together or lacks something is named" {
+@test "every command refuses outputs that are missing, misplaced, of another format or an input, and missing inputs" {
+    printf '{"region": [-2, -2, 2, 2], "casters": [], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1]}]}' >flat.json
+    printf '0,2,0,0,1,0\n' >points.csv
+    local command input ending options other
+    while read -r command input ending options; do
+        # shellcheck disable=SC2206 # words
+        options=($options)
+        refuses 2 '-o' -- "$command" "$input" "${options[@]}" || fail "$command: none"
+        refuses 2 out.what -- "$command" "$input" "${options[@]}" -o out.what || fail "$command: another format"
+        refuses 3 "none/out.$ending" -- "$command" "$input" "${options[@]}" -o "none/out.$ending" || fail "$command: no folder"
+        other=none.${input#*.}
+        old_output "out.$ending"
+        refuses 3 "$other" -- "$command" "$other" "${options[@]}" -o "out.$ending" || fail "$command: no input"
+        untouched "out.$ending"
+        ln -sf "$input" "link.$ending"
+        refuses 2 "link.$ending" "an input" -- "$command" "$input" "${options[@]}" -o "link.$ending" || fail "$command: its input"
+    done <<LIST
+bake box.obj exr ${SMALL[*]}
+flat flat.json exr
+query box.obj csv ${COARSE[*]:2} --sun 0,1,0 --points points.csv
+render box.obj png --sun 0,1,0 --size 8x8
+trade box.obj html --sun 0,1,0 --budget 1
+unwrap box.obj obj --size 64
+view box.obj html
+volume box.obj vdb --sun 0,1,0 --resolution 16
+voxelize box.obj vdb --resolution 16
+LIST
+    cmp box.obj <(write_box /dev/stdout) || fail "an input was replaced"
+}
+
+@test "an unknown method is refused with the list of methods, and options that exclude or need others are named" {
     old_output out.exr
     refuse_each bake box.obj <<'LIST'
 2 magic 'hard, classic, practical, improved, smooth, cone, rays, adaptive, exact, auto' | -o out.exr "${SMALL[@]}" --method magic
@@ -123,7 +173,7 @@ LIST
     untouched out.exr
 }
 
-@test "-q and -v are --quiet and --verbose, together with other letters too; a name that begins with a dash comes after --" {
+@test "-q and -v are --quiet and --verbose, letters combine, and -- ends the options" {
     succeed bake box.obj "${SMALL[@]}" -qo out.exr
     [ -z "$stderr" ]
     succeed bake box.obj "${SMALL[@]}" -v -o told.exr
@@ -134,10 +184,11 @@ LIST
     [ -s out.exr ]
 }
 
-@test "an option that is refused names itself, its value and what is expected" {
+@test "the error of a bad value names option, value and expectation" {
     refuse_each <<'LIST'
 2 "--rays '5000': expected a whole number from 1 to 4096" | bake box.obj --sun 1,1,1 -o out.exr --rays 5000
 2 "--size '64x': expected W or WxH, each from 1 to 65536 texels" | bake box.obj --sun 1,1,1 -o out.exr --size 64x
+2 "--seams 'stitch': expected one of default, keep, fix" | bake box.obj --sun 1,1,1 -o out.exr --seams stitch
 2 "--method 'soft': expected one of hard," | volume box.obj --sun 1,1,1 -o out.vdb --method soft
 2 "--resolution '1': expected a whole number from 2 to 65536" | query box.obj --points p.csv -o out.csv --resolution 1
 2 "--padding '5000': expected a whole number from 0 to 4096" | flat flat.json -o out.exr --padding 5000
@@ -181,7 +232,7 @@ tables() {
     [[ $(help_of size) == *"each from 1 to 65536 texels (512)"* ]] || fail "$(help_of size)"
 }
 
-@test "help prints what --help of a command prints, and pages of the manual" {
+@test "help prints a command's --help, and pages of the manual" {
     for command in $(commands); do
         "$VDBSHADE" "$command" --help >expected.txt
         succeed help "$command"
@@ -208,51 +259,37 @@ tables() {
 LIST
 }
 
-# endings_after TEXT: the endings in the first column of the table whose head holds the text.
-endings_after() {
-    awk -F'|' -v text="$1" 'index($0, text) { inside = 1 }
-                            inside && /^$/ { exit }
-                            inside && /^\| `/ { gsub(/[`,]/, "", $2); print $2 }' "$DOCS/formats.md"
-}
-
-@test "every format of the first table is written" {
-    local written=0 ending
-    for ending in $(endings_after '| ending | bits'); do
-        shade bake box.obj "${SMALL[@]}" --ao 1 --quiet -o "out.$ending"
-        done_well || fail "$ending"
-        [ -s "out.$ending" ] || fail "$ending: no file"
-        [ -z "$stderr" ] || fail "$ending: said something"
-        written=$((written + 1))
-    done
+@test "bake writes every format of docs/formats.md, and its help names the first ending of each" {
+    local written=0 help endings ending
+    help=$("$VDBSHADE" bake --help)
+    while read -ra endings; do
+        [[ $help == *".${endings[0]}"* ]] || fail "no ${endings[0]} in the help"
+        for ending in "${endings[@]}"; do
+            succeed bake box.obj "${SMALL[@]}" --ao 1 --quiet -o "out.$ending"
+            [ -s "out.$ending" ] && [ -z "$stderr" ] || fail "$ending"
+            written=$((written + 1))
+        done
+    done < <(awk -F'|' '/^[|] ending [|] bits/ { inside = 1 } inside && /^$/ { exit } inside && /^[|] `/ { gsub(/[`,]/, "", $2); print $2 }' "$DOCS/formats.md")
     [ "$written" -ge 11 ] || fail "only $written endings found"
+    [[ $help == *docs/formats.md* ]] || fail "no reference"
     no_leftovers
 }
 
-@test "the help names the first ending of every row" {
-    succeed bake --help
-    local ending
-    for ending in $(endings_after '| ending | bits' | while read -r first _; do echo "$first"; done); do
-        [[ $output == *".$ending"* ]] || fail "$ending"
-    done
-    [[ $output == *docs/formats.md* ]] || fail "no reference"
-}
-
-@test "light in a PNG is sRGB, and light over 1 is told once with its share" {
-    bake=(bake box.obj --sun 0,3,4 --irradiance --size 32 --resolution 24 --bits 8)
-    succeed "${bake[@]}" -o light.png --quiet
-    "$VDBSHADE" info light.png | grep -qx 'vdbshade_color_space: sRGB' || fail "it does not say sRGB"
-    shade "${bake[@]}" --pack R=shadow.sun,A=A -o data.png --quiet
-    "$VDBSHADE" info data.png | grep -qx 'vdbshade_color_space: linear' || fail "it does not say linear"
-    write_scene linear.json box.obj '' '"color_space": "linear"' '0, 3, 4'
-    no_sun "${bake[@]:2}"
-    shade bake linear.json "${rest[@]}" -o linear.png --quiet
-    ! same_values light.png linear.png || fail "color_space changes nothing"
-    write_scene srgb.json box.obj '' '"color_space": "srgb"'
-    refuses 2 srgb -- bake srgb.json "${rest[@]}" -o x.tif --bits 32
-    shade "${bake[@]}" -o light.png
+@test "light in a PNG is sRGB unless a scene asks for linear, and light over 1 gets one warning" {
+    local light=(--irradiance --size 32 --resolution 24 --bits 8)
+    local bake=(bake box.obj --sun 0,3,4 "${light[@]}")
+    succeed "${bake[@]}" -o light.png
     [[ $stderr != *"brighter than 1"* ]] || fail "nothing is"
+    info_tells light.png 'vdbshade_color_space: sRGB'
+    succeed "${bake[@]}" --pack R=shadow.sun,A=A -o data.png --quiet
+    info_tells data.png 'vdbshade_color_space: linear'
+    write_scene linear.json box.obj '' '"color_space": "linear"' '0, 3, 4'
+    succeed bake linear.json "${light[@]}" -o linear.png --quiet
+    differ light.png linear.png
+    write_scene srgb.json box.obj '' '"color_space": "srgb"'
+    refuses 2 srgb -- bake srgb.json "${light[@]}" -o x.tif --bits 32
     succeed "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 -o light.png
-    [ "$(grep -c 'texels are brighter than 1, up to 3.05, and cut to 1' <<<"$stderr")" -eq 1 ] || fail "not told"
-    shade "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 --bits 32 -o light.exr
+    [ "$(grep -c 'texels are brighter than 1, up to 3.05, and cut to 1' <<<"$stderr")" -eq 1 ] || fail "no warning"
+    succeed "${bake[@]}" --ambient 0.5,0.5,2.25 --ao 1 --bits 32 -o light.exr
     [[ $stderr != *"brighter than 1"* ]] || fail "EXR holds it"
 }

@@ -7,7 +7,7 @@ prepare() {
     awk '$1 == "v" { print "v", 3 * $2 - 1, 3 * $3 - 1, 3 * $4 - 1; next } { print }' box.obj >around.obj
 }
 
-@test "a picture and a channel show the texels that are in another solid, and one line tells of them" {
+@test "--invalid and the channel show texels inside other solids, and one warning names them" {
     write_scene box.json box.obj '"invalid": true'
     succeed_saying "texels are invalid (inside a solid or behind a wall)" "--invalid" -- bake box.json --caster above.obj --ao 0.5 \
         --method exact --ao-method exact --size 64 --resolution 24 -o box.exr --invalid where.png --verbose
@@ -17,7 +17,7 @@ prepare() {
     no_leftovers
 }
 
-@test "texels in a solid that lacks a side are 1 in the channel, and no line says that they are seen" {
+@test "texels in a solid without one side are invalid, and no warning calls them visible" {
     # A bar sticks out of the larger box through its wall. The box lacks the opposite side; a sheet stands before the gap.
     awk '$1 == "v" { print "v", $2, $3, 5 * $4; next } { print }' box.obj >bar.obj
     awk '/^o/ { print "o around"; next } /^f/ && left++ < 2 { next } { print }' around.obj >lacking.obj
@@ -28,7 +28,7 @@ prepare() {
     succeed_printing "'invalid': min 0, " ", max 1" -- info bar.exr
 }
 
-@test "a bake whose every texel is in a solid is refused, and the old output stays" {
+@test "a bake with all texels inside solids is refused, and the old output stays" {
     old_output out.exr
     # what everything else lies within is a sky dome, unless it is said to be solid
     refuses 2 box.obj "inside solids" info -- \
@@ -36,7 +36,7 @@ prepare() {
     untouched out.exr
 }
 
-@test "a bake of no texel is refused: UVs without area, or all outside the square" {
+@test "a bake of no texel is refused with the reason" {
     old_output out.exr
     sed 's/^vt .*/vt 0.5 0.5/' box.obj >flat.obj
     refuses 2 flat.obj "cover none of 32 × 32 texels" "no area" "--uv-set" -- bake flat.obj "${SMALL[@]}" -o out.exr
@@ -45,11 +45,11 @@ prepare() {
     untouched out.exr
 }
 
-@test "the picture is a PNG" {
+@test "--invalid writes PNG only" {
     refuses 2 --invalid where.jpg .png -- bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
 }
 
-@test "pictures of outputs of one name in several folders have names of their own" {
+@test "--invalid names its pictures apart if outputs have one name in several folders" {
     mkdir a b
     local output outputs=()
     for output in a/wall.exr b/wall.exr; do
@@ -61,7 +61,7 @@ prepare() {
     info_tells where.1.wall.png "40 × 40"
 }
 
-@test "charts closer than a texel are told of, and from which size on they are apart" {
+@test "a warning about charts closer than a texel names the size that parts them" {
     succeed bake box.obj "${SMALL[@]}" --size 16 -o out.exr
     [[ $stderr == *"charts lie closer than a texel"*"mesh 'box'"*"from --size 2"[56]" on"* ]] || fail "not told"
     succeed bake box.obj "${SMALL[@]}" --size 26 -o out.exr
@@ -69,13 +69,4 @@ prepare() {
     # no size parts charts that touch
     sed 's/^vt 0.31 /vt 0.33 /; s/^vt 0.35 /vt 0.33 /' box.obj >touching.obj
     succeed_saying "they touch" "margin" -- bake touching.obj "${SMALL[@]}" --size 64 -o out.exr
-}
-
-@test "with nothing said rays decide what is valid, as with exact, and voxels do not" {
-    options=(--caster above.obj --sun 0.3,1,0.2 --ao 0.5 --size 64 --quiet)
-    succeed bake box.obj "${options[@]}" --resolution 8 -o auto.exr
-    succeed bake box.obj "${options[@]}" --resolution 8 --method exact --ao-method exact -o exact.exr
-    same_values auto.exr exact.exr
-    succeed bake box.obj "${options[@]}" --resolution 64 -o finer.exr
-    succeed_printing "A: alike; " " covered, 0 in one alone" -- compare auto.exr finer.exr
 }

@@ -16,20 +16,6 @@ prepare() {
     info_tells seeds.vdb "class: level set"
 }
 
-@test "bad options and places are refused" {
-    old_output out.vdb
-    refuse_each voxelize <<'LIST'
-2 -o | box.obj --resolution 24
-2 out.exr | box.obj -o out.exr
-3 none/out.vdb | box.obj -o none/out.vdb
-2 --voxel-size | box.obj -o out.vdb --voxel-size 0
-4 | box.obj -o out.vdb --voxel-size 1e-7
-3 none.obj | none.obj -o out.vdb
-2 out.vdb | out.vdb -o out.vdb
-LIST
-    untouched out.vdb
-}
-
 @test "FILE.vdb:GRID names a grid wherever a .vdb is read; a file of that whole name is the file" {
     "$VDBSHADE" voxelize box.obj -o box.vdb --name hull --voxel-size 0.1 --quiet
     printf '0.1,0.2,2\n0,3,0\n' >points.csv
@@ -57,7 +43,7 @@ LIST
     succeed query a.vdb:hull.vdb:hull --points points.csv --distance -o out.csv
 }
 
-@test "info says what objects are taken for" {
+@test "info says whether objects are solids, rooms or open" {
     info_tells box.obj "taken for: 1 solid"
     info_tells room.obj "taken for: 1 wall with air in front of faces"
     info_tells crate.obj "taken for: 1 open solid," "problem: 4 open edges"
@@ -83,7 +69,7 @@ write_studs() {
     } >"$1"
 }
 
-@test "AO between texels keeps the foot of what the voxels lose" {
+@test "AO between texels keeps the contacts of studs thinner than a voxel" {
     write_studs studs.obj
     for spacing in 1 8; do
         write_scene studs.json studs.obj '' "\"objects\": \"floor\", \"ao_spacing\": $spacing"
@@ -95,7 +81,7 @@ write_studs() {
     awk -v largest="$largest" 'BEGIN { exit !(largest > 0 && largest < 0.175) }' || fail "off by $largest"
 }
 
-@test "solid, shell and inward overrule what is found, and a pattern that matches nothing is refused with names" {
+@test "--treat overrides detection, and an unknown name is refused with the names there are" {
     succeed_saying "baked as a shell" -- voxelize crate.obj --verbose -o crate.vdb --resolution 32
     succeed_saying "closed over the holes" -- voxelize crate.obj --verbose -o crate.vdb --resolution 32 --treat '*=solid'
     succeed_saying "baked as a shell" -- voxelize box.obj --verbose -o shell.vdb --resolution 32 --treat 'b*=sheet' --treat 'box=sheet'
@@ -106,7 +92,7 @@ write_studs() {
     refuses 2 "no object is named 'none*'" -- bake box.obj -o out.exr --ao 1 --treat 'none*=room'
 }
 
-@test "casters of a scene say it too" {
+@test "keys of a scene's casters override detection" {
     cat >scene.json <<'JSON'
 {"casters": [{"mesh": "crate.obj", "solid": "box"}, {"mesh": "box.obj", "shell": ["b*"], "inward": ["box"],
   "transform": {"translate": [3, 0, 0]}}],
