@@ -1,4 +1,4 @@
-# What a bake writes and says, and says beforehand.
+# bake: its images, statistics, messages and dry run; and any number of threads, for all commands.
 load helper
 
 SUN=(--sun 0.3,1,0.2 --sun-angle 5)

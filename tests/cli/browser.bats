@@ -1,4 +1,4 @@
-# What `view` writes, as Chromium shows it: by the pixels of its picture.
+# Chromium shows the pages of `view`, and the tests look at pixels of its picture.
 load helper
 load browser
 

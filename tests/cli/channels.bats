@@ -1,11 +1,11 @@
-# What a bake can give beside shadow and AO: bent normals, tints, ambient light; casters in layers.
+# Channels beside shadow and AO: bent normals, tints, the sky, ambient light. And casters in layers.
 load helper
 
 @test "bent normals, tints and irradiance have channels of their own" {
     write_scene box.json box.obj '"tint": "quadratic"' '' '1, 1, 1'
     succeed bake box.json --ao 0.5 --size 32 --resolution 32 --bent-normals world \
         --ambient 0.1,0.2,0.3 -o box.exr --quiet
-    # nothing is beside a box: bent normals are those of its sides; what is turned away from the sun has the ambient light
+    # nothing hides the sky from a box, so bent normals are those of its sides; sides away from the sun have the ambient light
     info_tells box.exr "'A'" "'ao'" "'bent.X': min -1, " ", max 1" "'bent.Y'" "'bent.Z'" "'irradiance.B': min 0.3, " "'irradiance.R'" \
         "'shadow.sun'" "'tint.sun.B'" "'tint.sun.G'" "'tint.sun.R'"
 }
@@ -23,7 +23,7 @@ load helper
     options=(--size 64 --resolution 32 --quiet)
     succeed bake box.obj --sky z "${options[@]}" --stats stats.json -o whole.exr
     succeed_printing "'sky': min 0, " ", max 1" -- info whole.exr
-    # method and error are told, of the channel and of outputs
+    # image and statistics record method and error
     [[ $output =~ "vdbshade_sky: "(exact|adaptive)" over z, max error 0.02, sobol" ]] || fail "$output"
     grep -q '"name": "sky"' stats.json || fail "$(cat stats.json)"
     awk '/"sky": {/ { here = 1 } here && /"estimated_rmse"/ { exit !($2 + 0 <= 0.02 && $2 !~ /null/) }' stats.json ||

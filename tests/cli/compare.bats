@@ -1,4 +1,4 @@
-# A bake against its golden one: every way in which bakes go wrong is told by the measure that is for it.
+# compare: each defect of a bake fails the measure that is made for it; limits, noise and reports.
 load helper
 
 POST='{"sdf": {"shape": "capsule", "half_height": 0.5, "radius": 0.05, "translate": [-1, 0.55, -1.3]}},'

@@ -1,4 +1,4 @@
-# The process that parses files of strangers: what code that a file has taken over can do from there.
+# The confined reader: code that a file has taken over can do no harm from there.
 load helper
 
 setup() {

@@ -100,7 +100,7 @@ options_of() {
 
 @test "the documents name functions and constants that the headers declare" {
     cat "$BATS_TEST_DIRNAME"/../../include/vdbshade/*.h | grep -oE '\b(vsh|VSH)_[A-Za-z0-9_]+' | sort -u >declared.txt
-    # What CMake and the tests are told is left out.
+    # Variables of CMake and of the tests are left out.
     grep -ohE '\b(vsh|VSH)_[A-Za-z0-9_]*[A-Za-z0-9]\b' "$DOCS"/*.md "$DOCS/../README.md" |
         grep -vxE 'VSH_(CLAIMS|BITS|TESTS|WERROR|PYTHON|EMBREE|OIIO|DRACO|BENCH.*)' | sort -u >names.txt
     [ "$(wc -l <names.txt)" -gt 20 ] || fail "too few: $(cat names.txt)"

@@ -1,4 +1,4 @@
-# tools/slurm on a Slurm of its own: munged, slurmctld and two slurmd on this machine, one of which is killed.
+# tools/slurm on a private Slurm: munged, slurmctld and two slurmd on this machine, one of which the test kills.
 load helper
 
 tools=$BATS_TEST_DIRNAME/../../tools/slurm

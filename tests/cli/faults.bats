@@ -1,5 +1,4 @@
-# Where the output cannot go, and that it comes whole or not at all: runs that are killed, disks that are full at any byte, pipes that
-# nobody reads.
+# Outputs are complete or the old ones: killed bakes, full disks, bad places, --output-folder.
 load helper
 
 prepare() {

@@ -7,7 +7,7 @@ bats_require_minimum_version 1.5.0
 
 MODELS=$BATS_TEST_DIRNAME/../models FONT=/usr/share/fonts/truetype/dejavu/DejaVuSans.ttf
 
-# Each test starts in an empty folder, but for a cube that can be baked, and what prepare() of its file writes.
+# Each test starts in an empty folder with a cube that can be baked, and calls prepare() of its file.
 setup() {
     cd "$BATS_TEST_TMPDIR" || return 1
     write_box box.obj
@@ -79,7 +79,7 @@ write_gltf() {
     python3 "$BATS_TEST_DIRNAME/gltf.py" write "$@"
 }
 
-# show_gltf FILE EXPRESSION…: what is in the file.
+# show_gltf FILE EXPRESSION…: prints Python expressions of the file.
 show_gltf() {
     python3 "$BATS_TEST_DIRNAME/gltf.py" show "$@"
 }

@@ -1,4 +1,4 @@
-# info: what a file holds, and what is wrong with it; units, materials and buffers of meshes.
+# info: contents and problems of files, as text and as JSON; units and blended materials.
 load helper
 
 @test "info lists the contents of a mesh, a level set and a scene" {

@@ -1,5 +1,5 @@
-# Bad input and files that mean harm: the exit code of its kind, one line that names the file, the place in it, the value and the limit,
-# and the old output untouched. Code 3 is for a file that cannot be read through, 2 for what is written in one that can.
+# Bad and hostile input: an exit code by kind, one line with file, place, value and limit, and the old output stays. Code 3 is for
+# files that cannot be read, 2 for bad contents, 4 for limits.
 load helper
 
 prepare() {

@@ -1,4 +1,4 @@
-# SIGINT and SIGTERM.
+# Signals: SIGINT, SIGTERM and SIGHUP.
 load helper
 
 # interrupted SIGNAL SECONDS ARG …: runs the program until it says something, waits, and sends the signal, which must end it. Sets

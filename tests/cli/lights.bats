@@ -1,4 +1,4 @@
-# --lights: the lights of a glTF, with those that the command line or a scene names.
+# --lights: lights of glTF files, beside the sun and a scene's lights.
 load helper
 
 # write_lit FILE NODES LIGHTS: a floor of 4 × 4 and a plate over it, with nodes that carry lights.

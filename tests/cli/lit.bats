@@ -1,7 +1,7 @@
-# A .glb or .gltf as output: the mesh file with its light.
+# Assets as outputs (.glb, .gltf): the mesh file with its light.
 load helper
 
-# What is there, in one line, but for the cube and what Bats writes.
+# files [PATTERN]: names in one line, without the cube and Bats' own files.
 files() {
     local name names=()
     for name in ${1:-*}; do
@@ -68,7 +68,7 @@ sets_are() {
         sets_are lit$n.glb 2 1
         [[ $stderr != *TEXCOORD* ]] || fail "$stderr"
     done
-    # what is lit by it can be baked as it is, to the light that was baked into it
+    # the lightmap's UVs can be baked again
     succeed bake lit3.glb "${BAKE[@]}" --uv-set 1 --unwrap never --irradiance -o again.exr
     # a lightmap that stays keeps its set
     for n in ao.glb ao2.glb; do

@@ -1,4 +1,4 @@
-# Materials: what they cut out by textures, opacity maps (map_d) and vertex alpha, what of them is blended, and choosing by their names.
+# Materials: cut-outs by textures, opacity maps (map_d) and vertex alpha; one-sided ones; choosing by name.
 load helper
 
 # write_level FILE MATERIAL IMAGE: a floor of 4 × 4 under material "earth" and a plate over it, of two primitives side by

@@ -1,4 +1,4 @@
-# What is baked where no method is named, what is said of it, and what voxels lose; the accurate end: rays, adaptive, exact.
+# Default methods, errors of voxels and rays and their warnings; methods by rays; the golden bakes.
 load helper
 
 prepare() {
@@ -21,7 +21,7 @@ write_fence() {
     } >"$1"
 }
 
-# What the statistics say of "shadow" or "ao": method, max_error, estimated_rmse.
+# said CHANNEL KEY: the value in s.json of "shadow" or "ao".
 said() {
     sed -n "/\"$1\": {/,/}/s/.*\"$2\": \"\{0,1\}\([^\",]*\).*/\1/p" s.json
 }

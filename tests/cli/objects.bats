@@ -1,4 +1,4 @@
-# Objects: which of a file's receive, one image for each, and what lies over what.
+# Objects of a file: choosing receivers and casters, an image for each, overlaps, and warnings about them.
 load helper
 
 @test "objects that each fill the unit square are refused with counts, the worst pair and both ways out" {
@@ -150,7 +150,7 @@ LIST
 
 @test "every warning and note that is printed is documented" {
     local sources=("$BATS_TEST_DIRNAME"/../../src) docs=$BATS_TEST_DIRNAME/../../docs/warnings.md missing=
-    # the strings of each call joined, what is filled in cut out, and the longest piece of the rest
+    # of each call, joins the strings, cuts out formats, and prints the longest piece of the rest
     while IFS= read -r piece; do
         grep -qF -- "$piece" "$docs" || missing+="$piece"$'\n'
     done < <(find "${sources[@]}" -name '*.c' -o -name '*.cpp' | xargs awk '

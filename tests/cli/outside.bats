@@ -1,4 +1,4 @@
-# A folder of a stranger's: files that never end, and names and links that lead out of it. What the user names is followed.
+# A stranger's folder: pipes in place of files, and names and links that lead out. Links that the user names are followed.
 load helper
 
 # For outputs: a stranger's folder, and the user's.

@@ -1,4 +1,4 @@
-# What outputs tell of where they come from: `info` prints it, and nothing of it varies between two runs.
+# Provenance in outputs: `info` prints it, and it is the same in every run.
 load helper
 
 @test "an EXR records version, command, method, light, voxel size and the hash of its input" {

@@ -1,4 +1,4 @@
-# What the system refuses is told as what it is, and outputs are on the disk before they are in their place.
+# Errors name what the system refuses: descriptors, threads, memory, places. Outputs are synced before they are renamed.
 load helper
 
 setup_file() {

@@ -1,5 +1,4 @@
-# `bake --shard I/N` and `merge`: parts that are baked by themselves come to the bits of one bake. What is wrong with parts, which may be
-# of strangers, is named.
+# `bake --shard I/N` and `merge`: merged parts have the bytes of one bake. Errors name bad parts, which may be of strangers.
 load helper
 
 prepare() {

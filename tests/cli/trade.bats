@@ -1,4 +1,4 @@
-# Error against time.
+# trade: reports of error against time.
 load helper
 
 TINY=(--sun 0.3,1,0.2 --sun-angle 20 --size 24 --resolutions 12,24 --truth-rays 64 --budget 60)

@@ -1,4 +1,4 @@
-# Lightmap UVs that are made: by `unwrap`, for receivers of a bake (--unwrap, --texels-per-unit, --pages), and with its light as an OBJ.
+# Lightmap UVs made by `unwrap` and by a bake (--unwrap, --texels-per-unit, --pages); lit OBJ outputs.
 load helper
 
 LIGHT=(--sun 0.3,1,0.2 --sun-angle 5 --ao 0.5 --size 64)
@@ -148,7 +148,7 @@ LIST
     # the values are those of the images
     shade bake fit.json --resolution 24 --ao 1 --irradiance --ambient 0.25,0.25,0.25 -o images.exr
     same images.second.exr all.second.exr
-    # and what is invalid has a picture for each, of pages too
+    # --invalid writes a picture for each, also for each page
     succeed bake fit.json --resolution 24 --ao 1 -o lit.glb --invalid where.png
     [ "$(echo where*)" = "where.0.lit.box.png where.1.lit.second.png" ] || fail "$(ls)"
     succeed bake uneven.obj --sun 0.3,1,0.2 --resolution 24 --ao 1 --unwrap always --size 64 --pages 2 -o lit.obj --invalid page.png

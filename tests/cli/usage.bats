@@ -1,4 +1,4 @@
-# Help, version, and what is wrong with a command line; the documents of formats and settings say the same.
+# Help, version, and bad command lines of every command. Help and documents agree on settings and formats.
 load helper
 
 commands() {

@@ -1,4 +1,4 @@
-# Texels that are not valid: shown, counted and told of; and bakes of nothing.
+# Invalid texels: pictures, counts and warnings of them; and bakes of nothing.
 load helper
 
 # Boxes a quarter above the one, and around it.

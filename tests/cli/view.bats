@@ -1,4 +1,4 @@
-# vdbshade view: the page as a file, and what is refused. What is seen of it: browser.bats.
+# vdbshade view: the page as a file, and its errors. browser.bats looks at it.
 load helper
 
 prepare() {

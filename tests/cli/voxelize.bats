@@ -1,4 +1,4 @@
-# voxelize: meshes and scenes to level sets; and what casters are taken for: found by themselves, or said by name.
+# voxelize: level sets of meshes and scenes; solids, rooms and open meshes, detected or named; AO beside studs.
 load helper
 
 # A box whose faces look inwards, and one without a side.
