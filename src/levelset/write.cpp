@@ -3,68 +3,18 @@
 #include "base/text.h"
 #include "levelset/file.h"
 
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
 #include <openvdb/io/Archive.h>
-#include <ostream>
 #include <sstream>
-#include <streambuf>
 #include <vector>
 
 namespace vshi {
 
 namespace {
-
-// Writes through a sink: OpenVDB's own file writing does not check that the last bytes were written.
-class SinkBuffer final : public std::streambuf {
-  public:
-    explicit SinkBuffer(const char *path) : sink(vshi_sink_open(path)), bytes(size_t(1) << 20) { flush(); }
-    ~SinkBuffer() override { finish(); }
-    SinkBuffer(const SinkBuffer &) = delete;
-    SinkBuffer &operator=(const SinkBuffer &) = delete;
-
-    int finish() { // the errno of the first failure, or 0
-        flush();
-        return vshi_sink_close(&sink);
-    }
-
-  protected:
-    int_type overflow(int_type value) override {
-        flush();
-        return traits_type::eq_int_type(value, traits_type::eof()) ? traits_type::not_eof(value)
-                                                                   : sputc(traits_type::to_char_type(value));
-    }
-    int sync() override {
-        flush();
-        return 0; // finish() reports failures
-    }
-    pos_type seekpos(pos_type position, std::ios_base::openmode) override {
-        flush();
-        at = uint64_t(std::streamoff(position));
-        return position;
-    }
-    pos_type seekoff(off_type offset, std::ios_base::seekdir from, std::ios_base::openmode mode) override {
-        flush();
-        return from == std::ios_base::end
-                   ? pos_type(off_type(-1)) // unused
-                   : seekpos(offset + (from == std::ios_base::cur ? off_type(at) : 0), mode);
-    }
-
-  private:
-    void flush() {
-        const auto used = size_t(pptr() - pbase());
-        if (used > 0 && sink.file >= 0) {
-            vshi_sink_write(&sink, bytes.data(), used, at);
-        }
-        at += used;
-        setp(bytes.data(), bytes.data() + bytes.size());
-    }
-
-    vshi_sink sink;
-    std::vector<char> bytes;
-    uint64_t at = 0; // of the first byte of `bytes`
-};
 
 class Writer final : public openvdb::io::Archive {
   public:
@@ -121,6 +71,26 @@ class ContentHash {
     uint64_t hash[2] = {0xcbf29ce484222325u, 0x84222325cbf29ce4u};
 };
 
+// Writes a file anew. OpenVDB's own file writing does not check that the last bytes were written.
+void write_file(const char *temporary, const char *path, const std::vector<FloatGrid::Ptr> &grids,
+                const std::string &uuid) {
+    std::vector<char> bytes(size_t(1) << 20);
+    std::ofstream stream;
+    stream.exceptions(std::ios::failbit | std::ios::badbit);
+    stream.rdbuf()->pubsetbuf(bytes.data(), std::streamsize(bytes.size()));
+    try {
+        errno = 0;
+        stream.open(temporary, std::ios::binary);
+        Writer().write_to(stream, openvdb::GridCPtrVec(grids.begin(), grids.end()));
+        stream.seekp(std::streamoff(UUID_AT));
+        stream << uuid;
+        stream.close();
+    } catch (const std::ios_base::failure &) {
+        refuse(VSH_ERROR_WRITE, "%s: could not be written: %s", path,
+               errno != 0 ? std::strerror(errno) : "OpenVDB gave no reason");
+    }
+}
+
 struct Output {
     vshi_output file{nullptr, nullptr, 0};
     ~Output() { vshi_output_abandon(&file); } // nothing, once committed
@@ -147,17 +117,7 @@ vsh_result write_grids(const char *path, double voxel_size, const vsh_attribute 
             }
             hash.add(grid->tree());
         }
-        SinkBuffer buffer(output.file.temporary);
-        std::ostream stream(&buffer);
-        Writer().write_to(stream, openvdb::GridCPtrVec(grids.begin(), grids.end()));
-        stream.seekp(std::streamoff(UUID_AT));
-        stream << hash.uuid();
-        const bool good = stream.good();
-        const int number = buffer.finish();
-        if (number != 0 || !good) {
-            refuse(VSH_ERROR_WRITE, "%s: could not be written: %s", path,
-                   number != 0 ? std::strerror(number) : "OpenVDB gave no reason");
-        }
+        write_file(output.file.temporary, path, grids, hash.uuid());
         require(vshi_output_commit, &output.file);
     });
 }
