@@ -7,6 +7,7 @@
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/vec.h"
 #include "light/light.h"
 #include "lightmap/padding.h"
 #include "shapes/outline.h"
@@ -90,31 +91,12 @@ static double sample(const grid *g, vshi_point p) {
            v * ((1.0 - u) * (double)above[0] + u * (double)above[1]);
 }
 
-/* Clips the ray to the grid's rectangle; false if it misses. */
-static bool clip_ray(const grid *g, const view *v, double *from, double *to) {
-    const double origin[2] = {v->point.x, v->point.y}, direction[2] = {v->towards.x, v->towards.y};
-    for (int axis = 0; axis < 2; ++axis) {
-        if (direction[axis] == 0.0) {
-            if (origin[axis] < g->low[axis] || origin[axis] > g->high[axis]) {
-                return false;
-            }
-            continue;
-        }
-        const double a = (g->low[axis] - origin[axis]) / direction[axis];
-        const double b = (g->high[axis] - origin[axis]) / direction[axis];
-        *from = fmax(*from, fmin(a, b));
-        *to = fmin(*to, fmax(a, b));
-    }
-    return *from < *to;
-}
-
 /* Finds the least h/(s t) along the ray to the light's centre, at most 1; 0 if the ray hits the outline. */
 static double find_visible(const grid *g, const view *v) {
     double t = g->cell, end = v->distance;
-    if (!clip_ray(g, v, &t, &end)) {
-        return 1.0;
-    }
-    double least = 1.0;
+    vshi_clip_axis(v->point.x, v->towards.x, g->low[0], g->high[0], &t, &end);
+    vshi_clip_axis(v->point.y, v->towards.y, g->low[1], g->high[1], &t, &end);
+    double least = 1.0; /* also of a ray that misses the grid */
     for (int step = 0; step < MAX_STEPS && t < end; ++step) {
         const double h =
             sample(g, (vshi_point){v->point.x + t * v->towards.x, v->point.y + t * v->towards.y});

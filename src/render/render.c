@@ -83,19 +83,9 @@ static void store_float(vshi_vec v, float to[3]) {
 /* Clips a ray's interval *begin … *end to a box; false if nothing is left. */
 static bool clip_to_box(vshi_vec origin, vshi_vec direction, vshi_vec low, vshi_vec high, double *begin,
                         double *end) {
-    const double o[3] = {origin.x, origin.y, origin.z}, d[3] = {direction.x, direction.y, direction.z};
-    const double from[3] = {low.x, low.y, low.z}, to[3] = {high.x, high.y, high.z};
-    for (int axis = 0; axis < 3; ++axis) {
-        if (d[axis] == 0.0) {
-            if (o[axis] < from[axis] || o[axis] > to[axis]) {
-                return false;
-            }
-            continue;
-        }
-        const double a = (from[axis] - o[axis]) / d[axis], b = (to[axis] - o[axis]) / d[axis];
-        *begin = fmax(*begin, fmin(a, b));
-        *end = fmin(*end, fmax(a, b));
-    }
+    vshi_clip_axis(origin.x, direction.x, low.x, high.x, begin, end);
+    vshi_clip_axis(origin.y, direction.y, low.y, high.y, begin, end);
+    vshi_clip_axis(origin.z, direction.z, low.z, high.z, begin, end);
     return *begin < *end;
 }
 

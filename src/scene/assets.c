@@ -443,7 +443,7 @@ static vsh_result place_spheres(vshi_asset_place *place, const vsh_caster *caste
     }
     const vsh_result result =
         vshi_spheres_create(spheres, count, caster->transform, run, &place->spheres, &why);
-    vshi_spheres_list_free(read);
+    free(read);
     return result == VSH_OK ? VSH_OK
                             : vshi_fail(error, result, "caster %zu: %s%s%s", index,
                                         caster->path != NULL ? caster->path : "",

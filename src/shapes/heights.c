@@ -46,8 +46,7 @@ typedef struct checked_heights {
     const vsh_heights_source *source;
     const char *name;
     size_t samples;
-    double lowest, highest; /* local units */
-    double bottom;
+    double highest, bottom; /* local units */
 } checked_heights;
 
 /* Checks sizes and values. `call` names the public function. */
@@ -74,7 +73,7 @@ static vsh_result check_source(const vsh_heights_source *source, const char *cal
     }
     const double base =
         source->base > 0.0 ? source->base : DEFAULT_BASE * fmax(source->size[0], source->size[1]);
-    *terrain = (checked_heights){source, name, samples, lowest, highest, lowest - base};
+    *terrain = (checked_heights){source, name, samples, highest, lowest - base};
     return VSH_OK;
 }
 
@@ -154,26 +153,21 @@ static void write_bottom(const checked_heights *t, vshi_terrain grid, vshi_model
 static vsh_result allocate(const char *name, int32_t what, vshi_terrain grid, vsh_model *model,
                            vsh_error *error) {
     const bool solid = what == VSH_HEIGHTS_SOLID;
-    const size_t name_size = strlen(name) + 1;
     VSHI_TRY(vshi_allocate((void **)&model->shapes, 1, sizeof *model->shapes, name, error));
     model->shape_count = 1;
     VSHI_TRY(vshi_allocate((void **)&model->entries, 1, sizeof *model->entries, name, error));
     model->entry_count = model->entry_capacity = 1;
-    VSHI_TRY(vshi_allocate((void **)&model->entries->name, name_size, 1, name, error));
-    memcpy(model->entries->name, name, name_size);
-
+    VSHI_TRY(vshi_copy_text(&model->entries->name, name, name, error));
     vshi_model_shape *shape = model->shapes;
     shape->vertex_count = vshi_terrain_vertex_count(grid);
     shape->triangle_count = vshi_terrain_triangle_count(grid);
-    VSHI_TRY(vshi_allocate((void **)&shape->positions, shape->vertex_count, sizeof(float[3]), name, error));
-    VSHI_TRY(
-        vshi_allocate((void **)&shape->indices, shape->triangle_count, sizeof(uint32_t[3]), name, error));
-    if (!solid) {
-        VSHI_TRY(vshi_allocate((void **)&shape->normals, shape->vertex_count, sizeof(float[3]), name, error));
-        VSHI_TRY(vshi_allocate((void **)&shape->uvs[0], shape->vertex_count, sizeof(float[2]), name, error));
-        shape->uv_sets = 1;
-    }
-    return VSH_OK;
+    shape->uv_sets = solid ? 0 : 1;
+    const size_t smooth = solid ? 0 : shape->vertex_count;
+    const vshi_array arrays[] = {VSHI_ARRAY(shape->positions, 3 * shape->vertex_count),
+                                 VSHI_ARRAY(shape->indices, 3 * shape->triangle_count),
+                                 VSHI_ARRAY(shape->normals, 3 * smooth),
+                                 VSHI_ARRAY(shape->uvs[0], 2 * smooth)};
+    return VSHI_ALLOCATE_ALL(arrays, name, error);
 }
 
 static vsh_result check(const char *name, int32_t what, vshi_terrain grid, const vsh_run *run,
@@ -393,11 +387,7 @@ vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *
     made->depth = source->size[1] / (source->rows - 1) / cell;
     made->lowest = t.bottom / cell;
     made->highest = t.highest / cell;
-    made->info = (vshi_heights_info){.columns = source->columns,
-                                     .rows = source->rows,
-                                     .lowest = t.lowest,
-                                     .highest = t.highest,
-                                     .bytes = sizeof *made + t.samples * sizeof(float)};
+    made->info.bytes = sizeof *made + t.samples * sizeof(float);
     for (size_t i = 0; i < t.samples; ++i) {
         made->height[i] = (float)(source->height * (double)source->values[i] / cell);
     }

@@ -23,10 +23,6 @@ vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *
 void vshi_heights_free(vshi_heights *heights); /* NULL does nothing */
 
 typedef struct vshi_heights_info {
-    int32_t columns;      /* samples along x */
-    int32_t rows;         /* samples along z */
-    double lowest;        /* samples, local units */
-    double highest;       /* the same */
     double bounds_min[3]; /* world box of the solid */
     double bounds_max[3];
     uint64_t bytes; /* in memory */

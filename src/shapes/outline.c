@@ -689,21 +689,3 @@ void vshi_outline_get_info(const vsh_outline *o, vshi_outline_info *info) {
     memcpy(found.bounds_max, o->nodes[0].high, sizeof found.bounds_max);
     *info = found;
 }
-
-_Static_assert(sizeof(vshi_point) == 2 * sizeof(double), "points are handed out as pairs of doubles");
-
-const double *vshi_outline_contour(const vsh_outline *o, size_t index, size_t *count) {
-    const bool there = index < o->contour_count;
-    *count = there ? o->starts[index + 1] - o->starts[index] - 1 : 0;
-    return there ? &o->points[o->starts[index]].x : NULL;
-}
-
-double vshi_outline_distance(const vsh_outline *o, const double point[2]) {
-    VSHI_FLOATS;
-    const vshi_point p = {point[0], point[1]};
-    if (!isfinite(p.x) || !isfinite(p.y)) {
-        return NAN;
-    }
-    const double distance = sqrt(vshi_outline_square(o, p, INFINITY));
-    return vshi_outline_winding(o, p) != 0 ? -distance : distance;
-}

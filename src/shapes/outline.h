@@ -62,14 +62,6 @@ typedef struct vshi_outline_info {
 
 void vshi_outline_get_info(const vsh_outline *outline, vshi_outline_info *info);
 
-/* The points of contour `index`, [*count][2], which belong to the outline. The area lies to the left of the
- * way from each to the next, and from the last to the first. NULL and 0 for an index beyond the contours. */
-const double *vshi_outline_contour(const vsh_outline *outline, size_t index, size_t *count);
-
-/* Signed distance to the outline at a point [2], negative inside; NaN if the point is not finite. The time
- * grows with the logarithm of the number of points. */
-double vshi_outline_distance(const vsh_outline *outline, const double point[2]);
-
 typedef struct vshi_point {
     double x, y;
 } vshi_point;

@@ -29,7 +29,7 @@ void vshi_spheres_get_info(const vshi_spheres *spheres, vshi_spheres_info *info)
 
 /* Reads spheres from a CSV file. A row holds x, y, z and radius between commas, semicolons, tabs or blanks.
  * Numbers have a decimal point and may be in quotes. Empty rows, rows that begin with #, and a first row of
- * names do not count. *spheres is [*count][4]; free it with vshi_spheres_list_free(). Errors:
+ * names do not count. *spheres is [*count][4]; free it with free(). Errors:
  * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT: no spheres, or a bad row: the message gives its number in the file;
@@ -37,7 +37,6 @@ void vshi_spheres_get_info(const vshi_spheres *spheres, vshi_spheres_info *info)
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_spheres_read(const char *path, const vsh_run *run, double **spheres, size_t *count,
                              vsh_error *error);
-void vshi_spheres_list_free(double *spheres); /* NULL does nothing */
 
 typedef struct vshi_ball_block vshi_ball_block;
 

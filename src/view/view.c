@@ -427,43 +427,29 @@ static vsh_result write_scripts(page *p, vsh_error *error) {
     return VSH_OK;
 }
 
-typedef struct writing {
-    const char *path;
-    const vsh_view_bake *bakes;
-    size_t count;
-    const vshi_view_surface *surface;
-    const vsh_run *run;
-} writing;
-
-static vsh_result add_bakes(page *p, const writing *w, vsh_error *error) {
-    write_head(p);
-    for (size_t i = 0; i < w->count; ++i) {
-        VSHI_TRY(add_bake(p, &w->bakes[i], NULL, error));
-    }
-    if (w->surface != NULL) {
-        VSHI_TRY(add_bake(p, NULL, w->surface, error));
-    }
-    return write_scripts(p, error);
-}
-
-static vsh_result write_page(const writing *w, vsh_error *error) {
-    page p = {.path = w->path, .run = w->run};
-    VSHI_TRY(vshi_lit_begin_stream(&p.file, w->path, error));
+vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, size_t count,
+                                const vshi_view_surface *surface, const vsh_run *run, vsh_error *error) {
+    page p = {.path = path, .run = run};
+    VSHI_TRY(vshi_lit_begin_stream(&p.file, path, error));
     p.to = p.file.to;
     p.about = json_array();
-    const vsh_result result = p.about != NULL ? add_bakes(&p, w, error) : fail_memory(&p, error);
+    vsh_result result;
+    VSHI_TRY_DONE(p.about != NULL ? VSH_OK : fail_memory(&p, error));
+    write_head(&p);
+    for (size_t i = 0; i < count; ++i) {
+        VSHI_TRY_DONE(add_bake(&p, &bakes[i], NULL, error));
+    }
+    if (surface != NULL) {
+        VSHI_TRY_DONE(add_bake(&p, NULL, surface, error));
+    }
+    result = write_scripts(&p, error);
+done:
     json_decref(p.about);
     if (vshi_lit_end_stream(&p.file, result, error) != VSH_OK) {
         vshi_output_abandon(&p.file.output);
         return result != VSH_OK ? result : VSH_ERROR_WRITE;
     }
     return vshi_output_commit(&p.file.output, error);
-}
-
-vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, size_t count,
-                                const vshi_view_surface *surface, const vsh_run *run, vsh_error *error) {
-    writing w = {path, bakes, count, surface, run};
-    return write_page(&w, error);
 }
 
 static vsh_result check_bake(const vsh_view_bake *given, const char *what, vsh_view_bake *bake,

@@ -3,7 +3,7 @@
 #include "../unit/previews.h"
 
 static void free_list(double **list) {
-    vshi_spheres_list_free(*list);
+    free(*list);
 }
 
 /* --- parts of several scenarios */

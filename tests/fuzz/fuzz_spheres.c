@@ -11,6 +11,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (FUZZ_MAKE(list, vshi_spheres_read(path, &run, &list, &count, fuzz_error())) == VSH_OK) {
         FUZZ_TRY(vshi_spheres, spheres, vshi_spheres_create(list, count, NULL, &run, &spheres, fuzz_error()));
     }
-    vshi_spheres_list_free(list);
+    free(list);
     return 0;
 }

@@ -39,6 +39,19 @@ static inline vshi_outline_info info_of(const vsh_outline *outline) {
     return info;
 }
 
+/* The points of contour `index`, [*count][2]; NULL and 0 beyond the last. */
+static inline const double *contour_of(const vsh_outline *o, size_t index, size_t *count) {
+    *count = index < o->contour_count ? o->starts[index + 1] - o->starts[index] - 1 : 0;
+    return *count > 0 ? &o->points[o->starts[index]].x : NULL;
+}
+
+/* Signed distance at a point, negative inside. */
+static inline double distance_to(const vsh_outline *o, const double point[2]) {
+    const vshi_point p = {point[0], point[1]};
+    const double distance = sqrt(vshi_outline_square(o, p, INFINITY));
+    return vshi_outline_winding(o, p) != 0 ? -distance : distance;
+}
+
 /* Anything between 0 and 1, the same in every run. */
 static inline double any(uint64_t i) {
     i = (i ^ (i >> 30)) * UINT64_C(0xbf58476d1ce4e5b9) + UINT64_C(0x9e3779b97f4a7c15);
@@ -52,7 +65,7 @@ static inline double truth_square(const vsh_outline *o, double x, double y) {
     double least = INFINITY;
     size_t count;
     const double *p;
-    for (size_t c = 0; (p = vshi_outline_contour(o, c, &count)) != NULL; ++c) {
+    for (size_t c = 0; (p = contour_of(o, c, &count)) != NULL; ++c) {
         for (size_t i = 0; i < count; ++i) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
             const double dx = b[0] - a[0], dy = b[1] - a[1];
@@ -69,7 +82,7 @@ static inline bool truth_inside(const vsh_outline *o, double x, double y) {
     double angle = 0.0; /* by the sum of the angles that the segments are seen under */
     size_t count;
     const double *p;
-    for (size_t c = 0; (p = vshi_outline_contour(o, c, &count)) != NULL; ++c) {
+    for (size_t c = 0; (p = contour_of(o, c, &count)) != NULL; ++c) {
         for (size_t i = 0; i < count; ++i) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
             const double ax = a[0] - x, ay = a[1] - y, bx = b[0] - x, by = b[1] - y;
@@ -83,7 +96,7 @@ static inline bool truth_inside(const vsh_outline *o, double x, double y) {
 static inline bool truth_hit(const vsh_outline *o, double x, double y, double dx, double dy, double far) {
     size_t count;
     const double *p;
-    for (size_t c = 0; (p = vshi_outline_contour(o, c, &count)) != NULL; ++c) {
+    for (size_t c = 0; (p = contour_of(o, c, &count)) != NULL; ++c) {
         for (size_t i = 0; i < count; ++i) {
             const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count);
             const double ex = b[0] - a[0], ey = b[1] - a[1], px = a[0] - x, py = a[1] - y;

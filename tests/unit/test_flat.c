@@ -358,7 +358,7 @@ TEST(casters_become_one_outline) {
         double p[2], distance;
     } cases[] = {{{5.0, 1.5}, 0.5}, {{0.0, 3.0}, 2.0}, {{0.25, 6.0}, -0.25}, {{0.0, 0.0}, -1.0}};
     for (size_t i = 0; i < 4; ++i) {
-        assert_near(vshi_outline_distance(outline, cases[i].p), cases[i].distance, 1e-12);
+        assert_near(distance_to(outline, cases[i].p), cases[i].distance, 1e-12);
     }
     vsh_outline_free(outline);
     vsh_flat_scene_free(scene);

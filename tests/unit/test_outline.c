@@ -9,14 +9,12 @@ TEST(the_tree_finds_the_same_distance_as_a_search_of_all_edges) {
     int inside = 0;
     for (int i = 0; i < 2000; ++i) {
         const double p[2] = {5.0 * any(2 * (uint64_t)i) - 2.5, 4.0 * any(2 * (uint64_t)i + 1) - 2.5};
-        const double distance = vshi_outline_distance(letters, p);
+        const double distance = distance_to(letters, p);
         assert_true(fabs(fabs(distance) - sqrt(truth_square(letters, p[0], p[1]))) < 1e-12);
         assert_int_equal(distance < 0.0, truth_inside(letters, p[0], p[1]));
         inside += distance < 0.0;
     }
     assert_true(inside > 100);
-    assert_true(isnan(vshi_outline_distance(letters, (const double[]){NAN, 0.0})));
-    assert_true(isnan(vshi_outline_distance(letters, (const double[]){0.0, INFINITY})));
 }
 
 /* --- the area that contours wind around */
@@ -32,8 +30,8 @@ TEST(overlapping_squares_are_one_area) {
     assert_int_equal(info_of(both).contours, 1);
     assert_int_equal(info_of(both).points, 8);
     /* The lines inside the area are no border. */
-    assert_true(fabs(vshi_outline_distance(both, (const double[]){1.5, 1.5}) + sqrt(0.5)) < 1e-14);
-    assert_true(fabs(vshi_outline_distance(both, (const double[]){2.5, 0.5}) - 0.5) < 1e-14);
+    assert_true(fabs(distance_to(both, (const double[]){1.5, 1.5}) + sqrt(0.5)) < 1e-14);
+    assert_true(fabs(distance_to(both, (const double[]){2.5, 0.5}) - 0.5) < 1e-14);
 }
 
 TEST(contours_that_share_an_edge_are_united_and_reversed_ones_are_holes) {
@@ -41,21 +39,21 @@ TEST(contours_that_share_an_edge_are_united_and_reversed_ones_are_holes) {
     const double beside[16] = {0, 0, 1, 0, 1, 1, 0, 1, 1, 0.25, 2, 0.25, 2, 0.75, 1, 0.75};
     OWNED(vsh_outline) *both = polygons(beside, counts, 2);
     assert_true(fabs(info_of(both).area - 1.5) < 1e-14);
-    assert_true(fabs(vshi_outline_distance(both, (const double[]){1.0, 0.5}) + 0.25) < 1e-14);
+    assert_true(fabs(distance_to(both, (const double[]){1.0, 0.5}) + 0.25) < 1e-14);
     const double points[24] = {0, 0, 4, 0, 4,   4,   0,   4,   1,   1,   1,   3,
                                3, 3, 3, 1, 1.5, 1.5, 2.5, 1.5, 2.5, 2.5, 1.5, 2.5};
     OWNED(vsh_outline) *island = polygons(points, counts, 3);
     assert_true(fabs(info_of(island).area - 13.0) < 1e-14);
-    assert_true(vshi_outline_distance(island, (const double[]){1.2, 2.0}) > 0.0);
-    assert_true(vshi_outline_distance(island, (const double[]){2.0, 2.0}) == -0.5);
+    assert_true(distance_to(island, (const double[]){1.2, 2.0}) > 0.0);
+    assert_true(distance_to(island, (const double[]){2.0, 2.0}) == -0.5);
     size_t count;
     for (size_t c = 0; c < 3; ++c) { /* the area to the left, everywhere */
-        const double *p = vshi_outline_contour(island, c, &count);
+        const double *p = contour_of(island, c, &count);
         const double x = 0.5 * (p[0] + p[2]) - 1e-3 * (p[3] - p[1]),
                      y = 0.5 * (p[1] + p[3]) + 1e-3 * (p[2] - p[0]);
-        assert_true(vshi_outline_distance(island, (const double[]){x, y}) < 0.0);
+        assert_true(distance_to(island, (const double[]){x, y}) < 0.0);
     }
-    assert_null(vshi_outline_contour(island, 3, &count));
+    assert_null(contour_of(island, 3, &count));
     assert_int_equal(count, 0);
     /* a filled disc in it that runs the same way changes nothing */
     const double inner[16] = {0, 0, 4, 0, 4, 4, 0, 4, 1, 1, 3, 1, 3, 3, 1, 3};
@@ -75,7 +73,7 @@ TEST(a_pentagram_is_filled) {
     const double inner = 0.5 * (3.0 - sqrt(5.0));
     assert_true(fabs(info_of(star).area - 5.0 * inner * sin(PI / 5.0)) < 1e-13);
     assert_int_equal(info_of(star).points, 10);
-    assert_true(fabs(vshi_outline_distance(star, (const double[]){0.0, 0.0}) + inner) < 1e-12);
+    assert_true(fabs(distance_to(star, (const double[]){0.0, 0.0}) + inner) < 1e-12);
 }
 
 TEST(many_overlaps_leave_the_union) {
@@ -97,9 +95,9 @@ TEST(many_overlaps_leave_the_union) {
         double nearest = INFINITY; /* distance of the union, where that is known: outside */
         for (size_t k = 0; k < COUNT; ++k) {
             OWNED(vsh_outline) *one = polygon(points + 8 * k, 4);
-            nearest = fmin(nearest, vshi_outline_distance(one, p));
+            nearest = fmin(nearest, distance_to(one, p));
         }
-        const double distance = vshi_outline_distance(all, p);
+        const double distance = distance_to(all, p);
         assert_int_equal(distance < 0.0, nearest < 0.0);
         assert_true(nearest < 0.0 ? distance <= nearest + 1e-12 : fabs(distance - nearest) < 1e-12);
     }
@@ -123,8 +121,8 @@ TEST(letters_have_the_font_s_measures) {
     OWNED(vsh_outline) *o = lines_of("o", VSH_ALIGN_LEFT); /* a ring, with x-height 1120 */
     assert_int_equal(info_of(o).contours, 2);
     const vshi_outline_info ring = info_of(o);
-    assert_true(vshi_outline_distance(o, (const double[]){0.5 * (ring.bounds_min[0] + ring.bounds_max[0]),
-                                                          560.0 / 2048.0}) > 0.1);
+    assert_true(distance_to(o, (const double[]){0.5 * (ring.bounds_min[0] + ring.bounds_max[0]),
+                                                560.0 / 2048.0}) > 0.1);
 }
 
 TEST(letters_are_kerned) {
@@ -159,7 +157,7 @@ TEST(curves_are_followed) {
     assert_true(info.points > 100 && info.points < 2000);
     double sharpest = 0.0;
     size_t count;
-    const double *p = vshi_outline_contour(o, 0, &count);
+    const double *p = contour_of(o, 0, &count);
     for (size_t i = 0; i < count; ++i) {
         const double *a = p + 2 * i, *b = p + 2 * ((i + 1) % count), *c = p + 2 * ((i + 2) % count);
         const double first = atan2(b[1] - a[1], b[0] - a[0]), second = atan2(c[1] - b[1], c[0] - b[0]);
@@ -263,7 +261,7 @@ TEST(a_solid_image_is_its_rectangle) {
     const vshi_outline_info info = info_of(outline);
     assert_true(info.area == 48.0 && info.contours == 1); /* square pixels: 8 × 6 */
     assert_true(info.bounds_min[0] == -4.0 && info.bounds_max[1] == 3.0);
-    assert_true(fabs(vshi_outline_distance(outline, (const double[]){-7.0, 7.0}) - 5.0) < 1e-14);
+    assert_true(fabs(distance_to(outline, (const double[]){-7.0, 7.0}) - 5.0) < 1e-14);
     options.height = 1.0;
     OWNED(vsh_outline) *flat = outline_of_image(&options);
     assert_true(info_of(flat).area == 8.0);
@@ -292,7 +290,7 @@ TEST(an_anti_aliased_disc_is_round) {
     for (int i = 0; i < 360; ++i) {
         const double angle = PI * i / 180.0;
         const double p[2] = {cx - 0.5 * SIZE + radius * cos(angle), 0.5 * SIZE - cy + radius * sin(angle)};
-        assert_true(fabs(vshi_outline_distance(outline, p)) < 0.09); /* without anti-aliasing 0.3 */
+        assert_true(fabs(distance_to(outline, p)) < 0.09); /* without anti-aliasing 0.3 */
     }
 }
 
@@ -306,7 +304,7 @@ TEST(corners_join_by_their_middle) {
         options.threshold = joined ? 0.49 : 0.51;
         OWNED(vsh_outline) *outline = outline_of_image(&options);
         assert_int_equal(info_of(outline).contours, joined ? 1 : 2);
-        assert_int_equal(vshi_outline_distance(outline, (const double[]){0.0, 0.0}) < 0.0, joined);
+        assert_int_equal(distance_to(outline, (const double[]){0.0, 0.0}) < 0.0, joined);
     }
 }
 
@@ -325,7 +323,7 @@ TEST(any_image_closes) {
         OWNED(vsh_outline) *outline = outline_of_image(&options);
         for (int i = 0; i < W * H; ++i) { /* each pixel's centre is where it belongs */
             const double p[2] = {i % W + 0.5 - 0.5 * W, 0.5 * H - (double)(i / W) - 0.5};
-            assert_int_equal(vshi_outline_distance(outline, p) < 0.0, (plane[i] >= 0.5f) != invert);
+            assert_int_equal(distance_to(outline, p) < 0.0, (plane[i] >= 0.5f) != invert);
             assert_int_equal(truth_inside(outline, p[0], p[1]), (plane[i] >= 0.5f) != invert);
         }
         areas[invert] = info_of(outline).area;

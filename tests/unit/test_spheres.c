@@ -205,7 +205,7 @@ TEST(rows_of_a_file_are_read_or_refused_by_number) {
                   &spheres, &count));
     assert_int_equal(count, 4);
     assert_memory_equal(spheres, expected, sizeof expected);
-    vshi_spheres_list_free(spheres);
+    free(spheres);
     static const struct {
         const char *text, *message;
     } bad[] = {
