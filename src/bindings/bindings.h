@@ -21,10 +21,5 @@ typedef struct vshi_progress_filter {
     int32_t answered; /* the answer of `progress` */
 } vshi_progress_filter;
 
-static inline vshi_progress_filter vshi_progress_filter_default(void) {
-    vshi_progress_filter filter = {sizeof(vshi_progress_filter), NULL, NULL, 0.02, 0, 0.0, 0};
-    return filter;
-}
-
 /* A vsh_progress_fn: `filter` points to a vshi_progress_filter. */
 VSHI_SHARED int32_t vshi_progress_seldom(void *filter, const char *stage, double fraction);

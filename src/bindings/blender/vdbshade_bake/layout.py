@@ -3,6 +3,7 @@ import os
 
 import bmesh
 import bpy
+import numpy
 
 from . import scene
 from .scene import BakeError
@@ -64,7 +65,6 @@ class Layout:
 
     def read(self, folder):
         """Writes the new UVs into the meshes."""
-        numpy = scene.numpy_of()
         laid = read_obj(os.path.join(folder, "layout.obj"))
         if len(laid) != len(self.laid):
             raise BakeError("%d objects were laid out, of %d" % (len(laid), len(self.laid)))
@@ -115,7 +115,7 @@ class Layout:
                 layers.active_index = active
             self.undo.append(lambda obj=obj: obj.data.uv_layers.remove(obj.data.uv_layers[UV_NAME]))
         else:
-            before = scene.values_of(scene.numpy_of(), layer.data, "uv", 2)
+            before = scene.values_of(layer.data, "uv", 2)
             self.undo.append(lambda obj=obj: obj.data.uv_layers[UV_NAME].data.foreach_set("uv", before))
         layer.data.foreach_set("uv", uvs.ravel())
         obj.data.update()

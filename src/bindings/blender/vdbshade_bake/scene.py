@@ -5,21 +5,14 @@ import re
 import struct
 
 import mathutils
+import numpy
 
 
 class BakeError(Exception):
     """An error for the user, in one line."""
 
 
-def numpy_of():
-    try:
-        import numpy
-    except ImportError:
-        raise BakeError("Python's NumPy, which comes with Blender, is not found")
-    return numpy
-
-
-def values_of(numpy, items, name, width=1, kind=None):
+def values_of(items, name, width=1, kind=None):
     """Values of all items of a collection, such as "co" of a mesh's vertices, in one array of float32 or `kind`."""
     values = numpy.empty(width * len(items), kind or numpy.float32)
     items.foreach_get(name, values)
@@ -30,26 +23,26 @@ def is_caster(obj):
     return obj.type == "MESH" and not obj.hide_render and len(obj.data.polygons) > 0
 
 
-def keeps_corners(numpy, obj, mesh):
+def keeps_corners(obj, mesh):
     """Whether modifiers left an object's faces as they are, if not its vertices: each corner is what it was."""
-    ours, theirs = (values_of(numpy, which.loops, "vertex_index", 1, numpy.int32) for which in (obj.data, mesh))
+    ours, theirs = (values_of(which.loops, "vertex_index", 1, numpy.int32) for which in (obj.data, mesh))
     return len(obj.data.polygons) == len(mesh.polygons) and numpy.array_equal(ours, theirs)
 
 
-def arrays_of(numpy, obj, mesh, uv_name):
+def arrays_of(obj, mesh, uv_name):
     """Positions, normals (world), UVs or None, and indices of a mesh where its object stands, a vertex a corner."""
     mesh.calc_loop_triangles()
     if hasattr(mesh, "calc_normals_split"):  # until Blender 4.1
         mesh.calc_normals_split()
-    points = values_of(numpy, mesh.vertices, "co", 3)
-    vertices = values_of(numpy, mesh.loops, "vertex_index", 1, numpy.int32)
-    normals = values_of(numpy, mesh.loops, "normal", 3)
-    indices = values_of(numpy, mesh.loop_triangles, "loops", 3, numpy.int32)
+    points = values_of(mesh.vertices, "co", 3)
+    vertices = values_of(mesh.loops, "vertex_index", 1, numpy.int32)
+    normals = values_of(mesh.loops, "normal", 3)
+    indices = values_of(mesh.loop_triangles, "loops", 3, numpy.int32)
     uvs = None
     if uv_name is not None:
         if uv_name not in mesh.uv_layers:
             raise BakeError("'%s': its modifiers leave nothing of the UV map '%s'" % (obj.name, uv_name))
-        uvs = values_of(numpy, mesh.uv_layers[uv_name].data, "uv", 2)
+        uvs = values_of(mesh.uv_layers[uv_name].data, "uv", 2)
     if len(indices) == 0:
         return None
     matrix = numpy.array(obj.matrix_world, numpy.float64)
@@ -66,24 +59,23 @@ def arrays_of(numpy, obj, mesh, uv_name):
             indices.astype("<u4").ravel())
 
 
-def mesh_arrays(numpy, obj, depsgraph, uv_name, own_corners):
+def mesh_arrays(obj, depsgraph, uv_name, own_corners):
     """The arrays of an object as it is rendered; with `own_corners` without modifiers that change its faces, so that a
     vertex of the arrays is a corner of its mesh."""
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        if not own_corners or keeps_corners(numpy, obj, mesh):
-            return arrays_of(numpy, obj, mesh, uv_name)
+        if not own_corners or keeps_corners(obj, mesh):
+            return arrays_of(obj, mesh, uv_name)
     finally:
         evaluated.to_mesh_clear()
-    return arrays_of(numpy, obj, obj.data, uv_name)
+    return arrays_of(obj, obj.data, uv_name)
 
 
 class Glb:
     """A GLB that grows: axes as they are in Blender."""
 
     def __init__(self):
-        self.numpy = numpy_of()
         self.chunks, self.accessors, self.views, self.meshes, self.nodes = [], [], [], [], []
         self.size = 0
 
@@ -96,7 +88,7 @@ class Glb:
         return len(self.accessors) - 1
 
     def add_mesh(self, name, points, indices, **attributes):
-        if not self.numpy.isfinite(points).all():
+        if not numpy.isfinite(points).all():
             raise BakeError("'%s': has vertices that are not finite" % name)
         attributes["POSITION"] = self.add(points, "VEC3", 5126, len(points), min=points.min(axis=0).tolist(),
                                           max=points.max(axis=0).tolist())
@@ -108,17 +100,17 @@ class Glb:
         points, normals, uvs, indices = arrays
         attributes = {"NORMAL": self.add(normals, "VEC3", 5126, len(points))}
         if uvs is not None:
-            flipped = self.numpy.stack((uvs[:, 0], 1.0 - uvs[:, 1]), axis=1).astype("<f4")  # v down
+            flipped = numpy.stack((uvs[:, 0], 1.0 - uvs[:, 1]), axis=1).astype("<f4")  # v down
             attributes["TEXCOORD_0"] = self.add(flipped, "VEC2", 5126, len(points))
         self.nodes.append({"name": obj.name, "mesh": self.add_mesh(obj.name, points, indices, **attributes)})
 
     def add_instance(self, mesh, matrix, known):
         """A mesh that casts where an instance of it stands; `known` has the numbers of those that are there."""
-        numpy, key = self.numpy, mesh.as_pointer()
+        key = mesh.as_pointer()
         if key not in known:
             mesh.calc_loop_triangles()
-            points = values_of(numpy, mesh.vertices, "co", 3)
-            indices = values_of(numpy, mesh.loop_triangles, "vertices", 3, numpy.int32)
+            points = values_of(mesh.vertices, "co", 3)
+            indices = values_of(mesh.loop_triangles, "vertices", 3, numpy.int32)
             known[key] = None if len(indices) == 0 else self.add_mesh(
                 "instanced " + mesh.name, points.reshape(-1, 3).astype("<f4"), indices.astype("<u4"))
         if known[key] is not None and matrix.determinant() != 0.0:
@@ -144,7 +136,7 @@ def write_glb(path, objects, depsgraph, uv_names, own_corners=False, instances=F
     returns the names of the objects that have triangles."""
     glb, there = Glb(), []
     for obj in objects:
-        arrays = mesh_arrays(glb.numpy, obj, depsgraph, uv_names.get(obj.name), own_corners)
+        arrays = mesh_arrays(obj, depsgraph, uv_names.get(obj.name), own_corners)
         if arrays is not None:
             glb.add_object(obj, arrays)
             there.append(obj.name)

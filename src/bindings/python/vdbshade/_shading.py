@@ -108,30 +108,6 @@ def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, vis
 
 _SMALL = 64  # points that vsh_query_points() shades on the calling thread, without progress
 _FLOAT32: numpy.dtype = numpy.dtype(numpy.float32)
-_FLOAT64: numpy.dtype = numpy.dtype(numpy.float64)
-_UINT32: numpy.dtype = numpy.dtype(numpy.uint32)
-_KINDS = {_FLOAT32: "float", _FLOAT64: "double", _UINT32: "uint32_t"}
-
-
-def _rows(given: Any, kind: numpy.dtype, columns: int, count: Optional[int], name: str) -> Tuple[Any, int, Any]:
-    """Rows of a query: their pointer, the bytes between them (0: none), and their array, which is a copy if C cannot read them."""
-    if given is None:
-        return ffi.NULL, 0, None
-    found = given if isinstance(given, numpy.ndarray) else numpy.asarray(given)
-    shape = (None, columns) if columns > 1 else (None,)
-    size, stride = kind.itemsize, 0
-    fits = found.dtype == kind and found.ndim == len(shape) and (columns == 1 or found.shape[1] == columns) and found.flags.aligned
-    if fits and not found.flags.c_contiguous:
-        stride = found.strides[0]
-        inner = columns == 1 or found.strides[1] == size
-        fits = len(found) > 1 and inner and stride >= columns * size and stride % size == 0
-    if not fits:
-        found, stride = array(found, kind, shape, name), 0
-    if count is not None and len(found) != count:
-        raise ValueError(f"{name}: expected an array of shape {(count, columns) if columns > 1 else (count,)}, got {found.shape}")
-    if stride:
-        return ffi.cast(_KINDS[kind] + " *", found.__array_interface__["data"][0]), stride, found
-    return ffi.from_buffer(_KINDS[kind] + "[]", found), 0, found
 
 
 class Query(Handle, kind="vsh_query"):
@@ -161,10 +137,10 @@ class Query(Handle, kind="vsh_query"):
 
         Parameters
         ----------
-        positions : array of float64 or float32, shape (n, 3)
-            world units. Rows may be apart, as in a structured array: nothing is copied
+        positions : array of float64, shape (n, 3)
+            world units
         normals : array of float32, shape (n, 3), optional
-            likewise; needed for AO
+            needed for AO
         shadow, ao, error, distance, gradient : bool
             wanted values
         texels : array of uint32, shape (n,), optional
@@ -181,16 +157,7 @@ class Query(Handle, kind="vsh_query"):
         -----
         Up to 64 points are shaded on the calling thread.
         """
-        single = (positions if isinstance(positions, numpy.ndarray) else numpy.asarray(positions)).dtype == _FLOAT32
-        first, stride, at = _rows(positions, _FLOAT32 if single else _FLOAT64, 3, None, "positions")
-        count = len(at)
-        up, up_stride, up_array = _rows(normals, _FLOAT32, 3, count, "normals")
-        numbers, number_stride, number_array = _rows(texels, _UINT32, 1, count, "texels")
-        points = ffi.new("vsh_points *", [count, ffi.NULL if single else first, up, numbers])
-        layout = ffi.NULL
-        if single or stride or up_stride or number_stride:
-            layout = ffi.new("vsh_point_layout *", [ffi.sizeof("vsh_point_layout"), first if single else ffi.NULL, stride, up_stride,
-                                                     number_stride])
+        points, count = _points(positions, normals, texels)
         lights = self.light_count
         shapes = dict(shadow=(lights, count), shadow_error=(lights, count), ao=(count,), ao_error=(count,), distance=(count,),
                       gradient=(count, 3))
@@ -203,13 +170,13 @@ class Query(Handle, kind="vsh_query"):
         values, keeps = self._output(out, count)
         if count <= _SMALL:
             failure = ffi.new("vsh_error *")
-            result = lib.vsh_query_points(self.handle, points, layout, run_of(run).struct, values, ffi.NULL if stats is None else stats.struct,
-                                          failure)
+            result = lib.vsh_query_points(self.handle, points, ffi.NULL, run_of(run).struct, values,
+                                          ffi.NULL if stats is None else stats.struct, failure)
             if result != 0:
                 fail(result, failure)
         else:
-            call(lib.vsh_query_points, self, points, layout, values, stats, run=run)
-        del keeps, up_array, number_array
+            call(lib.vsh_query_points, self, points, None, values, stats, run=run)
+        del keeps
         return out
 
     def _check(self, out: Dict[str, numpy.ndarray], shapes: Mapping[str, Tuple[int, ...]]) -> None:
