@@ -523,7 +523,7 @@ TEST(bad_parts_and_layers_are_refused_by_name) {
     };
     for (size_t i = 0; i < COUNT_OF(bad); ++i) {
         vsh_occluders *made = (vsh_occluders *)&failure;
-        assert_fails(vshi_occluders_from_parts(&bad[i].parts, &made, &failure), VSH_ERROR_ARGUMENT,
+        assert_fails(vshi_occluders_make(&bad[i].parts, NULL, &made, &failure), VSH_ERROR_ARGUMENT,
                      bad[i].message);
         assert_null(made);
     }
