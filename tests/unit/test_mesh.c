@@ -3,8 +3,6 @@
 #include "handles.h"
 #include "testing.h"
 
-#include <time.h>
-
 /* The unit cube, anticlockwise from outside: corner i is at (i & 1, i >> 1 & 1, i >> 2). The last two
  * triangles are its top (z = 1). */
 static const float cube_positions[8][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
@@ -248,25 +246,6 @@ TEST(labels_have_name_or_number_in_whole_characters) {
         const char *tail = label.text + strlen(label.text) - strlen("é…'");
         assert_string_equal(tail, "é…'");
     }
-}
-
-/* A closed box: a flat heightfield of n × n cells, as a solid. */
-TEST(a_million_triangles_take_about_a_second) {
-    enum { N = 710, SIDE = N + 1 };
-    FREED float *heights = calloc(SIDE * SIDE, sizeof *heights);
-    const vsh_heights_source source = {
-        .columns = SIDE, .rows = SIDE, .values = heights, .size = {N, N}, .height = 1, .base = 1};
-    OWNED(vsh_model) *model = NULL;
-    assert_ok(vsh_model_from_heights(&source, VSH_HEIGHTS_SOLID, NULL, &model, &failure));
-    const vsh_mesh mesh = vsh_model_mesh(model, 0, -1);
-    const clock_t start = clock();
-    const vsh_mesh_report report = check(&mesh);
-    const double seconds = (double)(clock() - start) / CLOCKS_PER_SEC;
-    assert_true(mesh.triangle_count > 1000000);
-    assert_int_equal(report.open_edges, 0);
-    assert_int_equal(report.flipped_edges, 0);
-    assert_near(report.area, 2.0 * N * N + 4.0 * N, 1e-6);
-    assert_true(seconds < 10.0); /* 0.12 s measured; sanitizers and busy machines take longer */
 }
 
 TEST(names_match_patterns_as_in_a_shell) {
