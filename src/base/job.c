@@ -139,35 +139,26 @@ vsh_result vshi_parallel_each(vshi_job *job, size_t count, size_t grain, size_t 
 
 /* --- instruction sets */
 
-/* Returns a part of an instruction set that this machine lacks; NULL if it has all. */
-static const char *find_lacking(int32_t isa) {
+int32_t vshi_isa_available(int32_t isa) {
 #if defined(__x86_64__)
     if (isa == VSH_ISA_AVX2) {
-        return __builtin_cpu_supports("avx2") ? NULL : "AVX2";
+        return __builtin_cpu_supports("avx2") != 0;
     }
     if (isa == VSH_ISA_AVX512) {
-        return !__builtin_cpu_supports("avx512f")    ? "AVX-512F"
-               : !__builtin_cpu_supports("avx512dq") ? "AVX-512DQ"
-               : !__builtin_cpu_supports("avx512vl") ? "AVX-512VL"
-                                                     : NULL;
+        return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+               __builtin_cpu_supports("avx512vl");
     }
-    return NULL;
-#else
-    return isa > VSH_ISA_BASE ? "x86-64" : NULL;
 #endif
-}
-
-int32_t vshi_isa_available(int32_t isa) {
-    return vsh_get_name(VSH_NAMES_ISA, isa) != NULL && find_lacking(isa) == NULL;
+    return isa == VSH_ISA_BEST || isa == VSH_ISA_BASE;
 }
 
 static vsh_result check_isa(int32_t isa, vsh_error *error) {
-    if (vsh_get_name(VSH_NAMES_ISA, isa) == NULL) {
+    const char *name = vsh_get_name(VSH_NAMES_ISA, isa);
+    if (name == NULL) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %d is out of range 0 … %d", isa, VSHI_ISA_COUNT - 1);
     }
-    if (find_lacking(isa) != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %s: this machine has no %s",
-                         vsh_get_name(VSH_NAMES_ISA, isa), find_lacking(isa));
+    if (!vshi_isa_available(isa)) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "isa %s: this machine does not have it", name);
     }
     return VSH_OK;
 }
@@ -177,7 +168,7 @@ int32_t vshi_isa_resolve(int32_t isa) {
         return isa;
     }
     int32_t best = VSHI_ISA_COUNT - 1;
-    while (find_lacking(best) != NULL) {
+    while (!vshi_isa_available(best)) {
         --best;
     }
     return best;
