@@ -351,7 +351,8 @@ TEST(bad_triangles_are_refused) {
     make_sphere(&ball, 128, 1.0);
     vshi_triangles *triangles = NULL;
     const vsh_run small = run_within(1 << 20);
-    assert_fails(vshi_triangles_create(&ball.mesh, 1, NULL, &small, &triangles, &failure), VSH_ERROR_LIMIT, "");
+    assert_fails(vshi_triangles_create(&ball.mesh, 1, NULL, &small, &triangles, &failure), VSH_ERROR_LIMIT,
+                 "");
     const uint32_t wrong[3] = {0, 1, 99};
     const float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const vsh_mesh bad = mesh_of_arrays(NULL, corners, NULL, 3, wrong, 1);
