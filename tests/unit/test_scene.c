@@ -335,7 +335,7 @@ static const struct {
      ".direction: is zero, and so points nowhere"},
     {&light, "{'name':'a','type':'directional',@'radius':1}", ".radius: is no key of a directional light"},
     {&light, "{'name':'a','type':@'sun'}",
-     ".type: \"sun\" is none of directional, sphere, spot, rectangle, file"},
+     ".type: \"sun\" is none of directional, sphere, spot, rectangle"},
     {&light, "@{'type':'sphere','position':[0,0,0]}", ": key \"name\" is missing: a sphere light needs it"},
     {&light, "{'name':@'a b','type':'sphere'}",
      ".name: \"a b\" cannot name a light: expected 1 … 63 of A … Z, a … z, 0 … 9, _ and -"},
