@@ -201,7 +201,7 @@ static void find_sources(void *user, size_t begin, size_t end) {
 static void copy_value(const hiding *h, size_t from_texel, size_t to_texel) {
     const size_t from = vshi_plane_place(h->lightmap, h->width, from_texel),
                  to = vshi_plane_place(h->lightmap, h->width, to_texel);
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(h->lightmap, h->light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(h->lightmap, h->light_count, &c);) {
         const size_t components = vshi_plane_components(c.kind);
         /* a direction in another chart's tangent space means nothing here */
         const bool other = c.kind->holds == VSHI_HOLDS_VECTOR && h->lightmap->bent_space == VSH_BENT_TANGENT;

@@ -222,7 +222,7 @@ vsh_result vshi_page_finish(vshi_page *page, const vsh_run *run, vsh_bake_stats 
     vshi_plane *padded = NULL;
     VSHI_TRY(vshi_allocate((void **)&padded, kind_count * (page->light_count + 1), sizeof *padded, "padding",
                            error));
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(&page->lightmap, page->light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(&page->lightmap, page->light_count, &c);) {
         if (c.kind->padded) {
             padded[count++] = (vshi_plane){c.values, vshi_plane_components(c.kind)};
         }
@@ -314,7 +314,7 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_charts *c
     VSHI_TRY(vshi_planes_tighten(lightmap, light_count, width, height, &full, &tight, &memory, error));
     VSHI_TRY_DONE(vshi_tracer_create(occluders, lights, light_count, &shade, &tight, sum.errors != NULL,
                                      &full, &tracer, error));
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(&tight, light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(&tight, light_count, &c);) {
         memset(c.values, 0, width * height * vshi_plane_components(c.kind) * sizeof *c.values);
     }
     VSHI_TRY_DONE(bake(tracer, charts, &tight, light_count, &shade, &full, &sum, error));

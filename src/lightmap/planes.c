@@ -118,7 +118,7 @@ vsh_result vshi_planes_tighten(const vsh_lightmap *lightmap, size_t light_count,
     }
     const size_t texels = width * height, lists = KINDS * (light_count + 1);
     size_t floats = 0;
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(lightmap, light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(lightmap, light_count, &c);) {
         floats += texels * vshi_plane_components(c.kind);
     }
     float *values, **list;
@@ -128,7 +128,7 @@ vsh_result vshi_planes_tighten(const vsh_lightmap *lightmap, size_t light_count,
     VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     *memory = values;
     run->memory_held += (uint64_t)bytes;
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(lightmap, light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(lightmap, light_count, &c);) {
         float **own = list + (size_t)(c.kind - kinds) * (light_count + 1);
         own[c.light] = values;
         vshi_plane_set(tight, c.kind, own);
@@ -139,7 +139,7 @@ vsh_result vshi_planes_tighten(const vsh_lightmap *lightmap, size_t light_count,
 
 void vshi_planes_copy_rows(const vsh_lightmap *tight, const vsh_lightmap *lightmap, size_t light_count,
                            size_t width, size_t height) {
-    vshi_plane_cursor from = {NULL}, to = {NULL};
+    vshi_plane_cursor from = {.kind = NULL}, to = {.kind = NULL};
     while (vshi_plane_next(tight, light_count, &from) && vshi_plane_next(lightmap, light_count, &to)) {
         const size_t components = vshi_plane_components(to.kind), row = components * width;
         const size_t apart = components * vshi_plane_row(lightmap, width);

@@ -693,7 +693,7 @@ static vsh_result stitch_channels(stitching *s, const vsh_run *run, vsh_error *e
 /* Counts the stitched channels, or (`list`) adds the part of page `page` to them. */
 static size_t list_channels(const vsh_lightmap *lightmap, size_t light_count, channel *list, size_t page) {
     size_t count = 0;
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(lightmap, light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(lightmap, light_count, &c);) {
         const size_t components = c.kind->range != VSHI_RANGE_NONE ? vshi_plane_components(c.kind) : 0;
         for (size_t k = 0; k < components; ++k, ++count) {
             if (list != NULL) {

@@ -217,7 +217,7 @@ static vsh_result move_tile(part_file *f, const vshi_scene_page *page, size_t ti
             return fail_damaged(f->path, "its tiles", error);
         }
     }
-    for (vshi_plane_cursor c = {NULL}; vshi_plane_next(&p->lightmap, p->light_count, &c);) {
+    for (vshi_plane_cursor c = {.kind = NULL}; vshi_plane_next(&p->lightmap, p->light_count, &c);) {
         if (!is_finished_later(p, c.kind)) {
             VSHI_TRY(
                 move_array(f, page, &at, c.values, vshi_plane_components(c.kind) * sizeof(float), error));
