@@ -64,9 +64,27 @@ static inline double vshi_side_length(const vshi_cut_mesh *s, uint32_t side) {
 vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *chart_of,
                             uint32_t *chart_count, vsh_error *error);
 
+/* A binary heap, the least key first. Ties go by number, so the order of pushing does not show. */
+typedef struct vshi_heap_entry {
+    double key;
+    uint32_t what, by;
+} vshi_heap_entry;
+
+typedef struct vshi_heap {
+    vshi_heap_entry *entries;
+    size_t count, capacity;
+} vshi_heap;
+
+/* Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_heap_push(vshi_heap *heap, double key, uint32_t what, uint32_t by, vsh_error *error);
+
+/* The heap must not be empty. */
+vshi_heap_entry vshi_heap_pop(vshi_heap *heap);
+
 /* --- patches: charts as meshes of their own (patch.c) */
 
-enum { VSHI_QUARTERS = 4 }; /* turns of a patch in the atlas */
+/* Angles of a patch in the atlas, 22.5° apart, and the quarter turns of each. */
+enum { VSHI_ANGLES = 4, VSHI_QUARTERS = 4 };
 
 typedef struct vshi_patch {
     const vshi_cut_mesh *surface;
@@ -81,7 +99,7 @@ typedef struct vshi_patch {
     double stretch;        /* L2, see vsh_atlas_chart */
     bool kept;             /* uv are the mesh's own, and of any area */
     uint32_t depth;        /* how often it was cut out of another */
-    double size[2];        /* of the box of `uv`, once straightened */
+    double low[VSHI_ANGLES][2], size[VSHI_ANGLES][2]; /* box of `uv` at each angle, once straightened */
 } vshi_patch;
 
 /* Owns `triangles` from now on, also after a failure; uv is 0. Free with vshi_patch_free(), after a failure
@@ -90,8 +108,8 @@ vsh_result vshi_patch_make(const vshi_cut_mesh *surface, uint32_t *triangles, ui
                            vshi_patch *patch, vsh_error *error);
 void vshi_patch_free(vshi_patch *patch);
 
-/* The box around its uv, in a frame whose u is the unit vector `along`. */
-void vshi_patch_box(const vshi_patch *patch, const double along[2], double low[2], double high[2]);
+/* The box around its uv, turned by an angle anticlockwise. */
+void vshi_patch_box(const vshi_patch *patch, const double cosine_sine[2], double low[2], double high[2]);
 
 /* Twice the area of a patch's triangle in UVs, positive if it runs anticlockwise. */
 static inline double vshi_patch_doubled_area(const vshi_patch *p, uint32_t i) {
@@ -115,10 +133,6 @@ void vshi_patches_free(vshi_patches *patches);
 vsh_result vshi_patches_split(const vshi_patch *patch, const uint32_t *part, uint32_t parts, vshi_patches *to,
                               vsh_error *error);
 
-/* Numbers the connected parts of a patch in the order of their first triangles: part[count]. Triangles of
- * which only one is `beyond` are not connected; NULL: none is. Returns the number of parts. */
-uint32_t vshi_patch_find_parts(const vshi_patch *patch, const bool *beyond, uint32_t *part);
-
 /* Lays triangles (ascending, owned from now on) out as one chart, or as many as it takes so that none folds
  * or stretches beyond the limit; adds them to `patches`. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, double max_stretch,
@@ -131,11 +145,6 @@ vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint3
  * parameterization", 2008) if that stretches less. *flat: no triangle flips, none lies over another, and the
  * stretch is within the limit. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_flatten(vshi_patch *patch, double max_stretch, bool *flat, vsh_error *error);
-
-/* 8 A² L2² of a triangle with area A in UVs, and the L2 stretch of Sander and others ("Texture mapping
- * progressive meshes", 2001): the Dirichlet energy of the map from UVs to the surface, by cotangents (Pinkall
- * and Polthier, 1993). */
-double vshi_stretch_energy(const vshi_vec place[3], const double uv[3][2]);
 
 /* Scales uv to the patch's area and measures its stretch; false if a triangle flips or has no area. */
 bool vshi_flatten_measure(vshi_patch *patch);
@@ -187,10 +196,10 @@ vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_unwrap_options *op
 
 /* --- texels that a chart touches (mask.c) */
 
-/* How a patch lies on texels, before it has a place: uv times `scale` plus `offset` is in texels from the
+/* How a patch lies on texels, before it has a place: uv times `matrix` plus `offset` is in texels from the
  * mask's corner. */
 typedef struct vshi_fit {
-    double scale[2], offset[2];
+    double matrix[2][2], offset[2];
     double uneven;         /* scale along one side over that along the other */
     int32_t width, height; /* texels of its box */
 } vshi_fit;
@@ -207,13 +216,17 @@ typedef struct vshi_mask {
     uint64_t touched;
 } vshi_mask;
 
-/* Turns a patch's uv so that its box is small, begins at 0 and is at least as wide as high. */
-void vshi_patch_straighten(vshi_patch *patch);
+/* Turns a patch's uv so that its box is the smallest, begins at 0 and is at least as wide as high. Measures
+ * its box at each angle. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_patch_straighten(vshi_patch *patch, vsh_error *error);
 
-/* Fits a patch at so many texels to its unit. A patch that nearly fills its box becomes a whole
+/* Whether a patch nearly fills its box at angle 0: other angles do not help then. */
+bool vshi_patch_is_box(const vshi_patch *patch);
+
+/* Fits a patch at an angle and so many texels to its unit. A patch that nearly fills its box becomes a whole
  * number of texels wide and high, if its stretch stays within the limit. Its borders then lie near texels'
  * centres, so that a lookup between texels inside of it reads its own texels alone. */
-vshi_fit vshi_mask_fit(const vshi_patch *patch, double density, double max_stretch);
+vshi_fit vshi_mask_fit(const vshi_patch *patch, int angle, double density, double max_stretch);
 
 /* The texels that triangles of the patch touch with more than their border. Free with vshi_mask_free(), after
  * a failure too. Errors: VSH_ERROR_MEMORY. */
@@ -236,8 +249,8 @@ void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double
 
 typedef struct vshi_place {
     uint32_t page;
-    int32_t x, y;     /* texel of the mask's corner */
-    int32_t quarters; /* by which the mask is turned */
+    int32_t x, y;            /* texel of the mask's corner */
+    int32_t angle, quarters; /* the patch is turned by the angle, and its mask by quarters then */
     vshi_fit fit;
     uint64_t touched; /* texels */
 } vshi_place;

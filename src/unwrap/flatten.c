@@ -57,82 +57,135 @@ typedef struct adjacency {
 } adjacency;
 
 /* --- the order of elimination: nested dissection (George, "Nested dissection of a regular finite element
- * mesh", 1973). Planes halve the chart's box again and again. A vertex before a plane with a neighbour beyond
- * it comes after all others between the planes around it. */
+ * mesh", 1973) by planes through space */
 
-/* The tips of fans have so many neighbours that they come last of all. */
-enum { FAN = 64 };
+enum { FEW = 12, DEEPEST = 64 };
 
-typedef struct rank {
-    uint64_t code; /* the halves that a vertex lies in, the largest first, up to the plane that it touches */
-    int height;    /* of that plane: 0 touches none */
-    uint32_t vertex;
-} rank;
+typedef struct part {
+    uint32_t begin, end, row; /* vertices in the list; the first row that is theirs */
+    int depth;
+} part;
+
+typedef struct dissecting {
+    const adjacency *neighbours;
+    const vshi_vec *place;
+    uint32_t *list; /* vertices */
+    uint32_t *side; /* [count]: the part that a vertex is in, times two, and whether it is beyond the plane */
+    uint32_t *other; /* [count]: room */
+    uint32_t *order;
+} dissecting;
 
 static double along(vshi_vec p, int axis) {
     return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
 }
 
-static int compare_ranks(const void *a, const void *b) {
-    const rank *x = a, *y = b;
-    if (x->code != y->code) {
-        return x->code < y->code ? -1 : 1;
-    }
-    return x->height != y->height ? x->height - y->height : (x->vertex > y->vertex) - (x->vertex < y->vertex);
-}
-
-/* Interleaves the bits of three coordinates, 0 … 1 (Morton, 1966). */
-static uint64_t find_code(const double at[3]) {
-    enum { BITS = 20 };
-    uint64_t code = 0;
+/* The longest side of the part's box, and the mean along it. */
+static int find_plane(const dissecting *d, const part *p, double *middle) {
+    double low[3], high[3], sum[3];
     for (int k = 0; k < 3; ++k) {
-        const uint64_t whole = (uint64_t)(at[k] * ((1 << BITS) - 1));
-        for (int bit = 0; bit < BITS; ++bit) {
-            code |= (whole >> bit & 1) << (3 * bit + k);
+        low[k] = INFINITY;
+        high[k] = -INFINITY;
+        sum[k] = 0.0;
+    }
+    for (uint32_t i = p->begin; i < p->end; ++i) {
+        for (int k = 0; k < 3; ++k) {
+            const double x = along(d->place[d->list[i]], k);
+            low[k] = x < low[k] ? x : low[k];
+            high[k] = x > high[k] ? x : high[k];
+            sum[k] += x;
         }
     }
-    return code;
+    int axis = 0;
+    for (int k = 1; k < 3; ++k) {
+        axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
+    }
+    *middle = sum[axis] / (double)(p->end - p->begin);
+    return axis;
 }
 
-static void find_codes(const vshi_vec *place, uint32_t count, rank *ranks) {
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY};
-    for (uint32_t v = 0; v < count; ++v) {
-        vshi_grow_box(low, high, place[v]);
+static void number(dissecting *d, const part *p) {
+    for (uint32_t i = p->begin; i < p->end; ++i) {
+        d->order[d->list[i]] = p->row + (i - p->begin);
     }
-    const double size = fmax(high[0] - low[0], fmax(high[1] - low[1], high[2] - low[2]));
-    for (uint32_t v = 0; v < count; ++v) {
-        double at[3];
-        for (int k = 0; k < 3; ++k) {
-            at[k] = size > 0.0 ? (along(place[v], k) - low[k]) / size : 0.0;
+}
+
+/* Sorts a part's vertices into those before a plane, those beyond it, and those before it that touch these.
+ * `turned` exchanges before and beyond, for the tip of a fan that touches everything. Returns false if the
+ * plane parts nothing. */
+static bool cut(dissecting *d, const part *p, uint32_t tag, bool turned, part halves[2]) {
+    double middle;
+    const int axis = find_plane(d, p, &middle);
+    for (uint32_t i = p->begin; i < p->end; ++i) {
+        const uint32_t v = d->list[i];
+        d->side[v] = 2 * tag + ((along(d->place[v], axis) > middle) != turned);
+    }
+    const adjacency *a = d->neighbours;
+    uint32_t near = p->begin, beyond = 0, between = p->end;
+    for (uint32_t i = p->begin; i < p->end; ++i) {
+        const uint32_t v = d->list[i];
+        bool touches = false;
+        for (uint32_t n = 2 * a->first[v]; d->side[v] == 2 * tag && n < a->end[v] && !touches; ++n) {
+            touches = d->side[a->others[n]] == 2 * tag + 1;
         }
-        ranks[v] = (rank){find_code(at), 0, v};
+        if (touches) {
+            d->other[--between] = v;
+        } else if (d->side[v] == 2 * tag) {
+            d->other[near++] = v;
+        } else {
+            d->list[p->begin + beyond++] = v; /* at or before the vertex that was read */
+        }
     }
+    if (near == p->begin || beyond == 0) {
+        uint32_t at = p->begin + beyond; /* the list keeps all its vertices */
+        for (uint32_t i = p->begin; i < p->end; ++i) {
+            if (i < near || i >= between) {
+                d->list[at++] = d->other[i];
+            }
+        }
+        return false;
+    }
+    for (uint32_t i = 0; i < beyond; ++i) {
+        d->other[near + i] = d->list[p->begin + i];
+    }
+    for (uint32_t i = p->begin; i < p->end; ++i) {
+        d->list[i] = d->other[i];
+    }
+    halves[0] = (part){p->begin, near, p->row, p->depth + 1};
+    halves[1] = (part){near, near + beyond, p->row + (near - p->begin), p->depth + 1};
+    const part border = {between, p->end, p->row + (between - p->begin), 0};
+    number(d, &border);
+    for (uint32_t i = between; i < p->end; ++i) {
+        d->side[d->list[i]] = UINT32_MAX; /* no longer in a part */
+    }
+    return true;
 }
 
 /* order[v] is the row of vertex v. */
-static vsh_result dissect(const adjacency *a, const vshi_vec *place, uint32_t count, uint32_t *order,
+static vsh_result dissect(const adjacency *neighbours, const vshi_vec *place, uint32_t count, uint32_t *order,
                           vsh_error *error) {
-    rank *ranks = NULL;
-    VSHI_TRY(vshi_allocate((void **)&ranks, count, sizeof *ranks, what, error));
-    find_codes(place, count, ranks);
+    dissecting d = {.neighbours = neighbours, .place = place, .order = order};
+    const vshi_array arrays[] = {VSHI_ARRAY(d.list, count), VSHI_ARRAY(d.side, count),
+                                 VSHI_ARRAY(d.other, count)};
+    part stack[DEEPEST + 2];
+    size_t waiting = 0;
+    uint32_t tag = 0;
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     for (uint32_t v = 0; v < count; ++v) {
-        for (uint32_t i = 2 * a->first[v]; i < a->end[v]; ++i) {
-            const uint32_t w = a->others[i];
-            if (ranks[w].code > ranks[v].code && a->end[w] - 2 * a->first[w] <= FAN) {
-                const int height = 64 - __builtin_clzll(ranks[w].code ^ ranks[v].code);
-                ranks[v].height = height > ranks[v].height ? height : ranks[v].height;
-            }
+        d.list[v] = v;
+        d.side[v] = UINT32_MAX;
+    }
+    stack[waiting++] = (part){0, count, 0, 0};
+    while (waiting > 0) {
+        const part p = stack[--waiting];
+        if (p.end - p.begin > FEW && p.depth < DEEPEST &&
+            (cut(&d, &p, tag, false, stack + waiting) || cut(&d, &p, tag, true, stack + waiting))) {
+            waiting += 2;
+        } else {
+            number(&d, &p);
         }
+        ++tag;
     }
-    for (uint32_t v = 0; v < count; ++v) {
-        const bool tip = a->end[v] - 2 * a->first[v] > FAN;
-        ranks[v].code = tip ? UINT64_MAX : ranks[v].code | (((uint64_t)1 << ranks[v].height) - 1);
-    }
-    qsort(ranks, count, sizeof *ranks, compare_ranks);
-    for (uint32_t row = 0; row < count; ++row) {
-        order[ranks[row].vertex] = row;
-    }
-    free(ranks);
+    free(d.list);
     return VSH_OK;
 }
 
@@ -421,26 +474,18 @@ static bool project(vshi_patch *p) {
 
 /* --- measuring */
 
-double vshi_stretch_energy(const vshi_vec place[3], const double uv[3][2]) {
+/* 8 A² L2² of a triangle with area A in UVs: the Dirichlet energy of the map from UVs to the surface, by
+ * cotangents (Pinkall and Polthier, 1993). */
+static double find_energy(const vshi_patch *p, uint32_t i) {
     double sum = 0.0;
-    for (int a = 0; a < 3; ++a) {
-        const int b = (a + 1) % 3, c = (a + 2) % 3;
-        const vshi_vec across = vshi_sub(place[c], place[b]);
-        sum +=
-            ((uv[b][0] - uv[a][0]) * (uv[c][0] - uv[a][0]) + (uv[b][1] - uv[a][1]) * (uv[c][1] - uv[a][1])) *
-            vshi_dot(across, across);
+    for (int k = 0; k < 3; ++k) {
+        const uint32_t a = p->corner[i][k], b = p->corner[i][(k + 1) % 3], c = p->corner[i][(k + 2) % 3];
+        const vshi_vec across = vshi_sub(p->place[c], p->place[b]);
+        sum += ((p->uv[b][0] - p->uv[a][0]) * (p->uv[c][0] - p->uv[a][0]) +
+                (p->uv[b][1] - p->uv[a][1]) * (p->uv[c][1] - p->uv[a][1])) *
+               vshi_dot(across, across);
     }
     return sum;
-}
-
-static double find_energy(const vshi_patch *p, uint32_t i) {
-    vshi_vec place[3];
-    double uv[3][2];
-    for (int k = 0; k < 3; ++k) {
-        place[k] = p->place[p->corner[i][k]];
-        memcpy(uv[k], p->uv[p->corner[i][k]], sizeof uv[k]);
-    }
-    return vshi_stretch_energy(place, (const double(*)[2])uv);
 }
 
 bool vshi_flatten_measure(vshi_patch *p) {

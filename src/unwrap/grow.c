@@ -10,49 +10,40 @@
 
 static const char what[] = "growing charts";
 
-/* --- a binary heap, the least key first. Ties go by number, so the order of pushing does not show. */
+/* --- a heap */
 
-typedef struct heap_entry {
-    double key;
-    uint32_t what, by;
-} heap_entry;
-
-typedef struct heap {
-    heap_entry *entries;
-    size_t count, capacity;
-} heap;
-
-static bool comes_before(const heap_entry *a, const heap_entry *b) {
+static bool comes_before(const vshi_heap_entry *a, const vshi_heap_entry *b) {
     if (a->key != b->key) {
         return a->key < b->key;
     }
     return a->what != b->what ? a->what < b->what : a->by < b->by;
 }
 
-static vsh_result heap_push(heap *h, double key, uint32_t number, uint32_t by, vsh_error *error) {
-    VSHI_TRY(vshi_make_room((void **)&h->entries, h->count, &h->capacity, sizeof *h->entries, what, error));
-    const heap_entry entry = {key, number, by};
-    size_t at = h->count++;
-    for (size_t above; at > 0 && comes_before(&entry, &h->entries[above = (at - 1) / 2]); at = above) {
-        h->entries[at] = h->entries[above];
+vsh_result vshi_heap_push(vshi_heap *heap, double key, uint32_t number, uint32_t by, vsh_error *error) {
+    VSHI_TRY(vshi_make_room((void **)&heap->entries, heap->count, &heap->capacity, sizeof *heap->entries,
+                            what, error));
+    const vshi_heap_entry entry = {key, number, by};
+    size_t at = heap->count++;
+    for (size_t above; at > 0 && comes_before(&entry, &heap->entries[above = (at - 1) / 2]); at = above) {
+        heap->entries[at] = heap->entries[above];
     }
-    h->entries[at] = entry;
+    heap->entries[at] = entry;
     return VSH_OK;
 }
 
-static heap_entry heap_pop(heap *h) {
-    const heap_entry least = h->entries[0], last = h->entries[--h->count];
+vshi_heap_entry vshi_heap_pop(vshi_heap *heap) {
+    const vshi_heap_entry least = heap->entries[0], last = heap->entries[--heap->count];
     size_t at = 0;
-    for (size_t below; (below = 2 * at + 1) < h->count; at = below) {
-        if (below + 1 < h->count && comes_before(&h->entries[below + 1], &h->entries[below])) {
+    for (size_t below; (below = 2 * at + 1) < heap->count; at = below) {
+        if (below + 1 < heap->count && comes_before(&heap->entries[below + 1], &heap->entries[below])) {
             ++below;
         }
-        if (!comes_before(&h->entries[below], &last)) {
+        if (!comes_before(&heap->entries[below], &last)) {
             break;
         }
-        h->entries[at] = h->entries[below];
+        heap->entries[at] = heap->entries[below];
     }
-    h->entries[at] = last;
+    heap->entries[at] = last;
     return least;
 }
 
@@ -69,12 +60,13 @@ static const double WIDEST = 0.5;
 static const double NORMAL = 2.0, STRAIGHT = 1.0, SEAM = 2.0, FAR = 0.5;
 
 enum {
+    NORMAL_SMOOTHINGS = 2,
     MOST_SIDES = 48, /* a unit's first sides that count for straightness */
     CHUNK = 4096     /* units between checks for cancellation */
 };
 
 typedef struct unit {
-    vshi_vec normal;
+    vshi_vec normal; /* smoothed over neighbours, against noise of scans */
     vshi_vec centre;
     double area;
     uint32_t number;
@@ -97,7 +89,7 @@ typedef struct growing {
     uint32_t *owner; /* [count]: each unit's chart */
     chart *charts;   /* [count]: as many as there may be */
     uint32_t chart_count;
-    heap heap;
+    vshi_heap heap;
     double radius;  /* of a chart, for distances from its middle */
     uint32_t added; /* units */
 } growing;
@@ -159,6 +151,30 @@ static uint32_t unit_beyond(const growing *w, uint32_t i) {
     return w->surface->unit[w->surface->partner[w->sides[i]] / 3];
 }
 
+static vsh_result smooth_normals(growing *w, vsh_error *error) {
+    vshi_vec *before = NULL;
+    VSHI_TRY(vshi_allocate((void **)&before, w->count, sizeof *before, what, error));
+    for (int round = 0; round < NORMAL_SMOOTHINGS; ++round) {
+        for (uint32_t u = 0; u < w->count; ++u) {
+            before[u] = w->units[u].normal;
+        }
+        for (uint32_t u = 0; u < w->count; ++u) {
+            vshi_vec sum = vshi_scale(before[u], w->units[u].area);
+            for (uint32_t i = w->begin[u]; i < w->begin[u + 1]; ++i) {
+                const uint32_t other = unit_beyond(w, i);
+                /* a large unit counts no more than as many small ones */
+                sum = vshi_add(sum, vshi_scale(before[other], fmin(w->units[other].area, w->units[u].area)));
+            }
+            const vshi_vec normal = vshi_unit(sum);
+            if (vshi_dot(normal, normal) > 0.0) {
+                w->units[u].normal = normal;
+            }
+        }
+    }
+    free(before);
+    return VSH_OK;
+}
+
 /* --- charts */
 
 /* The cost for a chart to grow by a unit. */
@@ -187,7 +203,7 @@ static vsh_result push_around(growing *w, uint32_t number, uint32_t by, vsh_erro
     for (uint32_t i = w->begin[number]; i < w->begin[number + 1]; ++i) {
         const uint32_t other = unit_beyond(w, i);
         if (w->owner[other] == VSHI_NONE && vshi_dot(w->units[other].normal, w->charts[by].axis) > WIDEST) {
-            VSHI_TRY(heap_push(&w->heap, find_cost(w, other, by), other, by, error));
+            VSHI_TRY(vshi_heap_push(&w->heap, find_cost(w, other, by), other, by, error));
         }
     }
     return VSH_OK;
@@ -202,7 +218,7 @@ static void add_to_chart(growing *w, uint32_t number, uint32_t by) {
 /* Grows the chart by the units in the heap until none fits. Its axis follows its units. */
 static vsh_result grow(growing *w, vsh_error *error) {
     while (w->heap.count > 0) {
-        const heap_entry next = heap_pop(&w->heap);
+        const vshi_heap_entry next = vshi_heap_pop(&w->heap);
         if (w->owner[next.what] != VSHI_NONE) {
             continue;
         }
@@ -248,6 +264,7 @@ vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_
     VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     measure_units(&w);
     list_sides(&w);
+    VSHI_TRY_DONE(smooth_normals(&w, error));
     for (uint32_t u = 0; u < w.count; ++u) {
         w.owner[u] = VSHI_NONE;
     }

@@ -1,4 +1,4 @@
-/* Which texels a chart touches. */
+/* Which texels a chart touches. Its borders are drawn and filled, so triangles inside cost nothing. */
 #include "unwrap/charts.h"
 
 #include "base/memory.h"
@@ -104,24 +104,64 @@ static void rows_of(const double at[3][2], int32_t height, int32_t *first, int32
     *last = *last > *first ? *last : *first;
 }
 
-vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
-    *mask = (vshi_mask){.width = fit->width, .height = fit->height};
-    const size_t words = ((size_t)mask->width + 63) / 64;
-    uint64_t *bits = NULL;
-    VSHI_TRY(vshi_allocate((void **)&bits, words * (size_t)mask->height, sizeof *bits, what, error));
-    for (uint32_t i = 0; i < p->count; ++i) {
+/* The ends of a side, as a triangle without area. */
+static void place_side(const vshi_patch *p, const vshi_fit *fit, uint32_t side, double at[3][2]) {
+    for (int k = 0; k < 2; ++k) {
+        const double *uv = p->uv[p->corner[side / 3][(side + (uint32_t)k) % 3]];
+        for (int d = 0; d < 2; ++d) {
+            at[k][d] = uv[0] * fit->matrix[d][0] + uv[1] * fit->matrix[d][1] + fit->offset[d];
+        }
+    }
+    at[2][0] = at[1][0];
+    at[2][1] = at[1][1];
+}
+
+/* Marks where a side crosses the middle lines of rows. The patch lies between pairs of marks of a row. */
+static void mark_crossings(const double at[3][2], const vshi_mask *mask, size_t words, uint64_t *marks) {
+    const double *low = at[0][1] < at[1][1] ? at[0] : at[1], *high = at[0][1] < at[1][1] ? at[1] : at[0];
+    const int32_t first = clamp(ceil(low[1] - 0.5), mask->height),
+                  end = clamp(ceil(high[1] - 0.5), mask->height);
+    for (int32_t y = first; y < end; ++y) {
+        const double x = low[0] + (high[0] - low[0]) * ((y + 0.5 - low[1]) / (high[1] - low[1]));
+        const int32_t column = clamp(floor(x + ROOM), mask->width);
+        marks[words * (size_t)y + (size_t)column / 64] ^= (uint64_t)1 << (column % 64);
+    }
+}
+
+/* Sets the texels that borders touch. */
+static void draw_borders(const vshi_patch *p, const vshi_fit *fit, const vshi_mask *mask, size_t words,
+                         uint64_t *bits, uint64_t *marks) {
+    for (uint32_t side = 0; side < 3 * p->count; ++side) {
+        if (p->beyond[side] != VSHI_NONE) {
+            continue;
+        }
         double at[3][2];
         int32_t first, last;
-        for (int k = 0; k < 3; ++k) {
-            for (int d = 0; d < 2; ++d) {
-                at[k][d] = p->uv[p->corner[i][k]][d] * fit->scale[d] + fit->offset[d];
-            }
-        }
+        place_side(p, fit, side, at);
         rows_of(at, mask->height, &first, &last);
         for (int32_t y = first; y <= last; ++y) {
             const vshi_run run = touched_in(at, y, mask->width);
             vshi_bits_set(bits + words * (size_t)y, run.begin, run.end);
         }
+        mark_crossings((const double(*)[2])at, mask, words, marks);
+    }
+}
+
+vsh_result vshi_mask_make(const vshi_patch *p, const vshi_fit *fit, vshi_mask *mask, vsh_error *error) {
+    *mask = (vshi_mask){.width = fit->width, .height = fit->height};
+    const size_t words = (size_t)mask->width / 64 + 1, count = words * (size_t)mask->height;
+    uint64_t *bits, *marks;
+    const vshi_array arrays[] = {VSHI_ARRAY(bits, count), VSHI_ARRAY(marks, count)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    draw_borders(p, fit, mask, words, bits, marks);
+    for (size_t i = 0, within = 0; i < count; ++i) { /* an even number of marks ends each row outside */
+        uint64_t inside = marks[i];
+        for (int shift = 1; shift < 64; shift *= 2) {
+            inside ^= inside << shift;
+        }
+        inside = within != 0 ? ~inside : inside;
+        within = inside >> 63;
+        bits[i] |= inside;
     }
     const vsh_result result = list_runs(bits, words, mask, error);
     free(bits);
@@ -165,67 +205,123 @@ vsh_result vshi_mask_turn(const vshi_mask *mask, int quarters, vshi_mask *to, vs
 }
 
 void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double at[2]) {
-    const double x = uv[0] * fit->scale[0] + fit->offset[0], y = uv[1] * fit->scale[1] + fit->offset[1];
+    const double x = uv[0] * fit->matrix[0][0] + uv[1] * fit->matrix[0][1] + fit->offset[0],
+                 y = uv[0] * fit->matrix[1][0] + uv[1] * fit->matrix[1][1] + fit->offset[1];
     const double turned[4][2] = {
         {x, y}, {fit->height - y, x}, {fit->width - x, fit->height - y}, {y, fit->width - x}};
     at[0] = turned[quarters][0];
     at[1] = turned[quarters][1];
 }
 
-/* --- the smallest box around a chart: one of its sides mostly runs along a border (Freeman and Shapira,
+/* Cosines and sines of the angles. */
+static const double TURNS[VSHI_ANGLES][2] = {{1.0, 0.0},
+                                             {0.92387953251128676, 0.38268343236508977},
+                                             {0.70710678118654752, 0.70710678118654752},
+                                             {0.38268343236508977, 0.92387953251128676}};
+
+/* --- the smallest box around a chart: one of its sides runs along the convex hull (Freeman and Shapira,
  * "Determining the minimum-area encasing rectangle for an arbitrary closed curve", 1975) */
 
-/* Direction of the smallest box's lower side, among those of some sides of the border. */
-static void find_direction(const vshi_patch *p, double best[2]) {
-    enum { MOST = 64 };
-    uint32_t borders = 0, seen = 0;
-    double least = INFINITY;
-    best[0] = 1.0;
-    best[1] = 0.0;
-    for (uint32_t side = 0; side < 3 * p->count; ++side) {
-        borders += p->beyond[side] == VSHI_NONE;
+typedef struct point {
+    double x, y;
+} point;
+
+static int compare_points(const void *a, const void *b) {
+    const point *p = a, *q = b;
+    if (p->x != q->x) {
+        return p->x < q->x ? -1 : 1;
     }
-    for (uint32_t side = 0; side < 3 * p->count; ++side) {
-        if (p->beyond[side] != VSHI_NONE || seen++ % (1 + borders / MOST) != 0) {
-            continue;
+    return p->y != q->y ? (p->y < q->y ? -1 : 1) : 0;
+}
+
+static double left_turn(point a, point b, point c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+}
+
+/* Convex hull of sorted points, anticlockwise (Andrew, 1979); `hull` has room for 2 count. */
+static size_t find_hull(const point *points, size_t count, point *hull) {
+    size_t size = 0;
+    for (int half = 0; half < 2; ++half) {
+        const size_t first = size;
+        for (size_t i = 0; i < count; ++i) {
+            const point p = half == 0 ? points[i] : points[count - 1 - i];
+            while (size >= first + 2 && left_turn(hull[size - 2], hull[size - 1], p) <= 0.0) {
+                --size;
+            }
+            hull[size++] = p;
         }
-        const double *a = p->uv[p->corner[side / 3][side % 3]],
-                     *b = p->uv[p->corner[side / 3][(side + 1) % 3]];
-        const double x = b[0] - a[0], y = b[1] - a[1], length = sqrt(x * x + y * y);
-        double low[2], high[2];
+        --size; /* begins the other half */
+    }
+    return size;
+}
+
+static double dot_along(point p, double x, double y) {
+    return p.x * x + p.y * y;
+}
+
+/* Direction of the smallest box's lower side. */
+static point find_direction(const point *hull, size_t count) {
+    point best = {1.0, 0.0};
+    double least = INFINITY;
+    for (size_t i = 0; i < count; ++i) {
+        const point a = hull[i], b = hull[(i + 1) % count];
+        const double length = sqrt((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y));
         if (!(length > 0.0)) {
             continue;
         }
-        const double along[2] = {x / length, y / length};
-        vshi_patch_box(p, along, low, high);
-        const double area = (high[0] - low[0]) * (high[1] - low[1]);
-        if (area < least * 0.9999) { /* the first of equal boxes, whatever the rounding */
-            least = area;
-            memcpy(best, along, sizeof along);
+        const double x = (b.x - a.x) / length, y = (b.y - a.y) / length;
+        double low = INFINITY, high = -INFINITY, top = -INFINITY;
+        for (size_t k = 0; k < count; ++k) {
+            const double along = dot_along(hull[k], x, y), up = dot_along(hull[k], -y, x);
+            low = along < low ? along : low;
+            high = along > high ? along : high;
+            top = up > top ? up : top;
+        }
+        const double width = high - low, height = top - dot_along(a, -y, x);
+        if (width * height < least * 0.9999) { /* the first of equal boxes, whatever the rounding */
+            least = width * height;
+            best = (point){x, y};
         }
     }
+    return best;
 }
 
-/* Turns uv so that `along` is u, and moves their box to 0. */
-static void turn(vshi_patch *p, const double along[2]) {
+/* Turns uv so that `along` is u, and moves their box to 0. Returns whether it is higher than wide. */
+static bool turn(vshi_patch *p, point along) {
     double low[2], high[2];
-    vshi_patch_box(p, along, low, high);
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        const double uv[2] = {p->uv[v][0], p->uv[v][1]};
-        p->uv[v][0] = uv[0] * along[0] + uv[1] * along[1] - low[0];
-        p->uv[v][1] = uv[1] * along[0] - uv[0] * along[1] - low[1];
+        const point at = {p->uv[v][0], p->uv[v][1]};
+        p->uv[v][0] = dot_along(at, along.x, along.y);
+        p->uv[v][1] = dot_along(at, -along.y, along.x);
     }
-    p->size[0] = high[0] - low[0];
-    p->size[1] = high[1] - low[1];
+    vshi_patch_box(p, TURNS[0], low, high);
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        p->uv[v][0] -= low[0];
+        p->uv[v][1] -= low[1];
+    }
+    return high[1] - low[1] > high[0] - low[0];
 }
 
-void vshi_patch_straighten(vshi_patch *p) {
-    double along[2];
-    find_direction(p, along);
-    turn(p, along);
-    if (p->size[1] > p->size[0]) {
-        turn(p, (const double[2]){0.0, 1.0});
+vsh_result vshi_patch_straighten(vshi_patch *p, vsh_error *error) {
+    point *points, *hull;
+    const vshi_array arrays[] = {VSHI_ARRAY(points, p->vertex_count),
+                                 VSHI_ARRAY(hull, 2 * (size_t)p->vertex_count + 2)};
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
+    for (uint32_t v = 0; v < p->vertex_count; ++v) {
+        points[v] = (point){p->uv[v][0], p->uv[v][1]};
     }
+    qsort(points, p->vertex_count, sizeof *points, compare_points);
+    if (turn(p, find_direction(hull, find_hull(points, p->vertex_count, hull)))) {
+        turn(p, (point){0.0, 1.0});
+    }
+    for (int a = 0; a < VSHI_ANGLES; ++a) {
+        double high[2];
+        vshi_patch_box(p, TURNS[a], p->low[a], high);
+        p->size[a][0] = high[0] - p->low[a][0];
+        p->size[a][1] = high[1] - p->low[a][1];
+    }
+    free(points);
+    return VSH_OK;
 }
 
 /* --- fits to texels */
@@ -234,13 +330,17 @@ static int32_t whole(double x) {
     return x < 1.0 ? 1 : x > FARTHEST ? FARTHEST : (int32_t)x;
 }
 
-vshi_fit vshi_mask_fit(const vshi_patch *p, double density, double max_stretch) {
+bool vshi_patch_is_box(const vshi_patch *p) {
+    return p->area > BOX * p->size[0][0] * p->size[0][1];
+}
+
+vshi_fit vshi_mask_fit(const vshi_patch *p, int angle, double density, double max_stretch) {
     vshi_fit fit = {.uneven = 1.0};
     double factor[2];
     int32_t texels[2];
-    bool fits = !p->kept && p->area > BOX * p->size[0] * p->size[1];
+    bool fits = angle == 0 && !p->kept && vshi_patch_is_box(p);
     for (int k = 0; k < 2; ++k) {
-        const double length = p->size[k] * density;
+        const double length = p->size[angle][k] * density;
         texels[k] = whole(floor(length + 0.5));
         factor[k] = (texels[k] + 2.0 * BEYOND) / length;
         fits = fits && factor[k] < MOST_FIT && factor[k] > 1.0 / MOST_FIT;
@@ -250,10 +350,11 @@ vshi_fit vshi_mask_fit(const vshi_patch *p, double density, double max_stretch) 
     fit.uneven = fits ? uneven : 1.0;
     int32_t *sides[2] = {&fit.width, &fit.height};
     for (int k = 0; k < 2; ++k) {
-        const double length = p->size[k] * density;
+        const double length = p->size[angle][k] * density, scale = fits ? density * factor[k] : density;
         *sides[k] = fits ? texels[k] + 1 : whole(ceil(length - SLACK));
-        fit.offset[k] = fits ? 0.5 - BEYOND : 0.5 * (*sides[k] - length);
-        fit.scale[k] = fits ? density * factor[k] : density;
+        fit.offset[k] = (fits ? 0.5 - BEYOND : 0.5 * (*sides[k] - length)) - scale * p->low[angle][k];
+        fit.matrix[k][0] = scale * TURNS[angle][k];
+        fit.matrix[k][1] = scale * (k == 0 ? -TURNS[angle][1] : TURNS[angle][0]);
     }
     return fit;
 }

@@ -29,14 +29,19 @@ typedef struct placing {
     vshi_job *job;
     vshi_pack_item *items; /* [count] */
     size_t count;
-    vshi_mask (*masks)[VSHI_QUARTERS]; /* [count]; runs are NULL for turns not yet made; one block with all
-                                          arrays, those of the page too */
-    vshi_fit *fits;                    /* [count] */
-    uint32_t *order;                   /* [count]: items in the order in which they are placed */
+    double density;
+    vshi_mask **masks; /* [count][angles × VSHI_QUARTERS]; runs are NULL for turns not yet made; one
+                          block with all arrays, those of the page too */
+    int *angles;       /* [count]: how many are tried of each */
+    vshi_fit (*fits)[VSHI_ANGLES]; /* [count] */
+    uint32_t *order;               /* [count]: items in the order in which they are placed */
     atlas_page page;
+    int32_t *hints; /* row where the last chart of a size was placed */
 } placing;
 
+enum { LEAST_TURNED = 40 };               /* texels: shorter charts are turned by quarters only */
 enum { IMPATIENT = 3000, PATIENCE = 24 }; /* charts; rows */
+enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and search from the first row on */
 
 /* Share of a page's texels that padded charts may have for it to be tried. */
 static const double HOPE = 0.95;
@@ -46,8 +51,8 @@ static const double HOPE = 0.95;
  * bits are the row's bits or-ed over n shifts, by doubling. */
 
 enum {
-    GLANCES = 16, /* at the rows of a mask */
-    STEP = 96     /* rows of a chart for each row that its search skips */
+    NEEDS = 16,
+    STEP = 96 /* rows of a chart for each row that its search skips */
 };
 
 static void page_clear(atlas_page *page) {
@@ -116,22 +121,52 @@ static int32_t longest_run(const vshi_mask *mask, int32_t row) {
     return longest;
 }
 
-/* Whether some rows, spread over the mask, may find a free run that is long enough. */
-static bool may_fit(const atlas_page *page, const vshi_mask *mask, int32_t y) {
-    for (int32_t r = 0; r < mask->height; r += 1 + mask->height / GLANCES) {
-        if (page->free_run[y + r] < longest_run(mask, r)) {
+/* Some rows of a mask, spread over it, and the free runs that they need. */
+typedef struct needs {
+    int32_t row[NEEDS], length[NEEDS];
+    int32_t count;
+    int32_t least; /* free run that every row needs */
+    bool boxy;     /* `least` is nearly the most */
+} needs;
+
+static needs needs_of(const vshi_mask *mask) {
+    needs n = {.least = mask->width};
+    for (int32_t r = 0; r < mask->height; ++r) {
+        const int32_t longest = longest_run(mask, r);
+        n.least = longest < n.least ? longest : n.least;
+    }
+    n.boxy = 2 * n.least > mask->width;
+    const int32_t step = mask->height > NEEDS ? mask->height / NEEDS : 1;
+    for (int32_t r = step / 2; r < mask->height && n.count < NEEDS; r += step) {
+        n.row[n.count] = r;
+        n.length[n.count++] = longest_run(mask, r);
+    }
+    return n;
+}
+
+static bool may_fit(const atlas_page *page, const needs *n, int32_t y) {
+    for (int32_t i = 0; i < n->count; ++i) {
+        if (page->free_run[y + n->row[i]] < n->length[i]) {
             return false;
         }
     }
     return true;
 }
 
-/* The first row from y on at which the mask may fit. */
-static int32_t find_next_row(const atlas_page *page, const vshi_mask *mask, int32_t y, int32_t limit) {
-    while (y + mask->height <= limit && !may_fit(page, mask, y)) {
-        ++y;
+/* The first row from y on at which each row of the mask may find a free run that is long enough. */
+static int32_t find_next_row(const atlas_page *page, const vshi_mask *mask, const needs *n, int32_t y,
+                             int32_t limit) {
+    while (y + mask->height <= limit) {
+        int32_t r = n->boxy ? mask->height - 1 : -1;
+        while (r >= 0 && page->free_run[y + r] >= n->least) {
+            --r;
+        }
+        if (r < 0 && may_fit(page, n, y)) {
+            return y;
+        }
+        y += r < 0 ? 1 : r + 1;
     }
-    return y;
+    return limit;
 }
 
 static bool forbid_row(atlas_page *page, const vshi_mask *mask, int32_t y, int32_t r) {
@@ -172,18 +207,21 @@ static bool fits_row(atlas_page *page, const vshi_mask *mask, int32_t y, int32_t
     return false;
 }
 
-/* The lowest place, and there the leftmost, where a mask touches no taken texel and ends at row `limit` at
- * most; false if there is none. */
-static bool find_place(atlas_page *page, const vshi_mask *mask, int32_t limit, int32_t *x, int32_t *y) {
+/* The lowest place from `row` on, and there the leftmost, where a mask touches no taken texel and ends at row
+ * `limit` at most; false if there is none. */
+static bool find_place(atlas_page *page, const vshi_mask *mask, int32_t row, int32_t limit, int32_t *x,
+                       int32_t *y) {
     if (mask->width > page->width) {
         return false;
     }
     limit = limit < page->height ? limit : page->height;
+    const needs n = needs_of(mask);
     int32_t step = 1 + mask->height / STEP, patience = page->patience;
-    for (int32_t at = 0; (at = find_next_row(page, mask, at, limit)) + mask->height <= limit; at += step) {
+    for (int32_t at = row; (at = find_next_row(page, mask, &n, at, limit)) + mask->height <= limit;
+         at += step) {
         if (fits_row(page, mask, at, x)) {
             *y = at;
-            while (*y > 0 && at - *y < step && may_fit(page, mask, *y - 1) &&
+            while (*y > row && at - *y < step && may_fit(page, &n, *y - 1) &&
                    fits_row(page, mask, *y - 1, x)) {
                 --*y; /* a row that was skipped */
             }
@@ -245,8 +283,10 @@ static vsh_result placing_begin(const vshi_packing *packing, int32_t height, vsh
                          .words = ((size_t)packing->width + 63) / 64,
                          .patience = count > IMPATIENT ? PATIENCE : 0};
     const vshi_array arrays[] = {VSHI_ARRAY(p->masks, count),
+                                 VSHI_ARRAY(p->angles, count),
                                  VSHI_ARRAY(p->fits, count),
                                  VSHI_ARRAY(p->order, count),
+                                 VSHI_ARRAY(p->hints, HINT_SIDE * HINT_SIDE),
                                  VSHI_ARRAY(page->taken, page->words * (size_t)height),
                                  VSHI_ARRAY(page->free_run, (size_t)height),
                                  VSHI_ARRAY(page->forbidden, page->words + 1),
@@ -256,9 +296,11 @@ static vsh_result placing_begin(const vshi_packing *packing, int32_t height, vsh
 
 static void drop_masks(placing *p) {
     for (size_t i = 0; p->masks != NULL && i < p->count; ++i) {
-        for (int t = 0; t < VSHI_QUARTERS; ++t) {
-            vshi_mask_free(&p->masks[i][t]);
+        for (int m = 0; p->masks[i] != NULL && m < VSHI_QUARTERS * p->angles[i]; ++m) {
+            vshi_mask_free(&p->masks[i][m]);
         }
+        free(p->masks[i]);
+        p->masks[i] = NULL;
     }
 }
 
@@ -269,10 +311,20 @@ static void placing_free(placing *p) {
 
 /* --- masks */
 
-/* A vshi_element_fn over items. Makes an item's mask, before quarter turns. */
-static vsh_result make_mask(void *user, size_t i, vsh_error *error) {
+/* A vshi_element_fn over items. Makes an item's masks, before quarter turns: the mask of angle n is number
+ * VSHI_QUARTERS n. */
+static vsh_result make_masks(void *user, size_t i, vsh_error *error) {
     placing *p = user;
-    return vshi_mask_make(p->items[i].patch, &p->fits[i], p->masks[i], error);
+    const vshi_pack_item *item = &p->items[i];
+    const bool plain = vshi_patch_is_box(item->patch) || p->fits[i][0].width < LEAST_TURNED;
+    p->angles[i] = plain ? 1 : VSHI_ANGLES;
+    VSHI_TRY(vshi_allocate((void **)&p->masks[i], (size_t)p->angles[i], VSHI_QUARTERS * sizeof(vshi_mask),
+                           what, error));
+    for (int a = 0; a < p->angles[i]; ++a) {
+        p->fits[i][a] = vshi_mask_fit(item->patch, a, p->density * item->factor, p->packing->max_stretch);
+        VSHI_TRY(vshi_mask_make(item->patch, &p->fits[i][a], &p->masks[i][VSHI_QUARTERS * a], error));
+    }
+    return VSH_OK;
 }
 
 typedef struct sort_key {
@@ -296,7 +348,7 @@ static vsh_result sort_items(placing *p, vsh_error *error) {
     sort_key *keys = NULL;
     VSHI_TRY(vshi_allocate((void **)&keys, p->count, sizeof *keys, what, error));
     for (size_t i = 0; i < p->count; ++i) {
-        const vshi_fit *fit = &p->fits[i];
+        const vshi_fit *fit = &p->fits[i][0];
         keys[i] = (sort_key){(double)fit->width + fit->height, p->masks[i][0].touched, (uint32_t)i};
     }
     qsort(keys, p->count, sizeof *keys, compare_sort_keys);
@@ -311,16 +363,17 @@ static vsh_result sort_items(placing *p, vsh_error *error) {
  * VSH_ERROR_CANCELLED. */
 static vsh_result set_density(placing *p, double density, bool *possible, vsh_error *error) {
     drop_masks(p);
+    p->density = density;
     *possible = true;
     const int32_t longest = p->packing->width > p->packing->height ? p->packing->width : p->packing->height;
     for (size_t i = 0; i < p->count; ++i) {
         const vshi_pack_item *item = &p->items[i];
-        p->fits[i] = vshi_mask_fit(item->patch, density * item->factor, p->packing->max_stretch);
-        const vshi_fit *fit = &p->fits[i];
+        p->fits[i][0] = vshi_mask_fit(item->patch, 0, density * item->factor, p->packing->max_stretch);
+        const vshi_fit *fit = &p->fits[i][0];
         const int32_t longer = fit->width > fit->height ? fit->width : fit->height;
         *possible = *possible && longer <= longest;
     }
-    return *possible ? vshi_parallel_each(p->job, p->count, 16, 0, make_mask, p, error) : VSH_OK;
+    return *possible ? vshi_parallel_each(p->job, p->count, 16, 0, make_masks, p, error) : VSH_OK;
 }
 
 /* --- places */
@@ -331,33 +384,46 @@ static int count_turns(const vshi_mask *mask) {
     return !box ? VSHI_QUARTERS : mask->width == mask->height ? 1 : 2;
 }
 
+static int32_t *find_hint(placing *p, const vshi_mask *mask) {
+    return mask->width < HINT_SIDE && mask->height < HINT_SIDE
+               ? &p->hints[mask->height * HINT_SIDE + mask->width]
+               : NULL;
+}
+
 /* Places an item in the page; *placed tells whether there was room. Keeps the turned masks. */
 static vsh_result place_item(placing *p, uint32_t index, bool *placed, vsh_error *error) {
     vshi_place *at = &p->items[index].at;
     int32_t best_end = p->page.height;
     const vshi_mask *best = NULL;
     *placed = false;
-    vshi_mask *masks = p->masks[index];
-    for (int t = 0; t < count_turns(masks); ++t) {
-        vshi_mask *turned = &masks[t];
-        int32_t x, y;
-        if (turned->runs == NULL) {
-            VSHI_TRY(vshi_mask_turn(masks, t, turned, error));
+    for (int n = 0; n < p->angles[index]; ++n) {
+        vshi_mask *masks = &p->masks[index][VSHI_QUARTERS * n];
+        for (int t = 0; t < count_turns(masks); ++t) {
+            vshi_mask *turned = &masks[t];
+            int32_t x, y;
+            if (turned->runs == NULL) {
+                VSHI_TRY(vshi_mask_turn(masks, t, turned, error));
+            }
+            int32_t *hint = find_hint(p, turned);
+            const bool found = find_place(&p->page, turned, hint != NULL ? *hint : 0, best_end, &x, &y);
+            if (found && hint != NULL) {
+                *hint = y;
+            }
+            const int32_t end = found ? y + turned->height : 0;
+            if (!found || (*placed && end == best_end && y >= at->y)) {
+                continue;
+            }
+            best = turned;
+            best_end = end;
+            at->x = x;
+            at->y = y;
+            at->angle = n;
+            at->quarters = t;
+            *placed = true;
         }
-        const bool found = find_place(&p->page, turned, best_end, &x, &y);
-        const int32_t end = found ? y + turned->height : 0;
-        if (!found || (*placed && end == best_end && y >= at->y)) {
-            continue;
-        }
-        best = turned;
-        best_end = end;
-        at->x = x;
-        at->y = y;
-        at->quarters = t;
-        *placed = true;
     }
     if (*placed) {
-        at->fit = p->fits[index];
+        at->fit = p->fits[index][at->angle];
         at->touched = best->touched;
         mark_taken(&p->page, best, at->x, at->y);
     }
@@ -370,6 +436,7 @@ static vsh_result fill_page(placing *p, const uint8_t *wanted, uint32_t page, bo
                             vsh_error *error) {
     *failed = VSHI_NONE;
     page_clear(&p->page);
+    memset(p->hints, 0, HINT_SIDE * HINT_SIDE * sizeof *p->hints);
     for (size_t i = 0; i < p->count; ++i) {
         vshi_pack_item *item = &p->items[p->order[i]];
         if (item->at.page != VSHI_NONE || (wanted != NULL && !wanted[item->mesh])) {
@@ -401,7 +468,7 @@ typedef struct pool {
 
 static double padded_area(const placing *p, size_t i) {
     /* half of the padding around a chart counts as its own */
-    const vshi_fit *fit = &p->fits[i];
+    const vshi_fit *fit = &p->fits[i][0];
     return (double)p->masks[i][0].touched + 0.5 * p->packing->padding * 2.0 * (fit->width + fit->height);
 }
 
@@ -520,7 +587,8 @@ enum { MOST_STEPS = 400, MANY = 500 /* charts */, ATTEMPTS = 16 };
 double vshi_pack_bytes(const vshi_packing *packing, size_t count) {
     const double page =
         ((packing->width / 64.0 + 2.0) * 8.0) * (packing->height + 2.0) + 4.0 * packing->height;
-    return page + (double)count * (VSHI_QUARTERS * sizeof(vshi_mask) + sizeof(vshi_fit) + 400.0);
+    return page +
+           (double)count * (VSHI_QUARTERS * sizeof(vshi_mask) + VSHI_ANGLES * sizeof(vshi_fit) + 400.0);
 }
 
 typedef struct search {
@@ -589,7 +657,7 @@ static double estimate_area(const search *s, double density) {
     double sum = 0.0;
     for (size_t i = 0; i < s->count; ++i) {
         const vshi_pack_item *item = &s->items[i];
-        const double *size = item->patch->size;
+        const double *size = item->patch->size[0];
         const double k = density * item->factor, width = size[0] * k, height = size[1] * k,
                      gap = s->packing->padding + 1.0, share = item->patch->area / (size[0] * size[1]);
         /* other charts use a part of the free texels of a box */

@@ -1,13 +1,19 @@
-/* Charts as meshes of their own. A chart that folds or stretches is cut by a plane, and its parts are laid
- * out anew. A single triangle always lies flat. */
+/* Charts as meshes of their own. A chart that folds or stretches is cut in two: regions grow from its two
+ * farthest triangles, and the cut runs where they meet. Each half is laid out anew. A single triangle always
+ * lies flat. */
 #include "unwrap/charts.h"
 
 #include "base/memory.h"
 #include "geometry/edges.h"
+#include "unwrap/charts.h"
 
 #include <stdlib.h>
 
 static const char what[] = "a chart";
+
+/* Cuts should run where surfaces bend. So paths get longer by so many sizes of the chart for each radian or
+ * so between the normals of two triangles. */
+static const double BEND = 1.0;
 
 /* After so many cuts, a chart falls into its triangles: it is no surface. */
 enum { FULL_DEPTH = 64 };
@@ -81,12 +87,12 @@ void vshi_patch_free(vshi_patch *p) {
     *p = (vshi_patch){0};
 }
 
-void vshi_patch_box(const vshi_patch *p, const double along[2], double low[2], double high[2]) {
+void vshi_patch_box(const vshi_patch *p, const double turn[2], double low[2], double high[2]) {
     low[0] = low[1] = INFINITY;
     high[0] = high[1] = -INFINITY;
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
         const double *uv = p->uv[v];
-        const double at[2] = {uv[0] * along[0] + uv[1] * along[1], uv[1] * along[0] - uv[0] * along[1]};
+        const double at[2] = {turn[0] * uv[0] - turn[1] * uv[1], turn[1] * uv[0] + turn[0] * uv[1]};
         for (int k = 0; k < 2; ++k) {
             low[k] = at[k] < low[k] ? at[k] : low[k];
             high[k] = at[k] > high[k] ? at[k] : high[k];
@@ -135,68 +141,113 @@ done:
     return result;
 }
 
-uint32_t vshi_patch_find_parts(const vshi_patch *p, const bool *beyond, uint32_t *part) {
-    uint32_t parts = 0;
-    for (uint32_t i = 0; i < p->count; ++i) {
-        part[i] = i;
-    }
-    for (uint32_t side = 0; side < 3 * p->count; ++side) {
-        const uint32_t a = side / 3, b = p->beyond[side] / 3;
-        if (p->beyond[side] != VSHI_NONE && (beyond == NULL || beyond[a] == beyond[b])) {
-            vshi_set_join(part, a, b);
-        }
-    }
-    for (uint32_t i = 0; i < p->count; ++i) {
-        part[i] = vshi_set_of(part, i);
-    }
-    for (uint32_t i = 0; i < p->count; ++i) { /* a root stands before the others of its part */
-        part[i] = part[i] == i ? parts++ : part[part[i]];
-    }
-    return parts;
+typedef struct splitting {
+    const vshi_patch *patch;
+    vshi_heap heap;
+    double *far;     /* [count]: length of the path from the seeds; one block with `owner` */
+    uint32_t *owner; /* [count]: 0, 1; VSHI_NONE: not reached */
+    double bend;
+    bool whole_units; /* triangles of a unit stay together */
+} splitting;
+
+static vshi_vec find_middle(const vshi_patch *p, uint32_t i) {
+    return vshi_scale(
+        vshi_add(p->place[p->corner[i][0]], vshi_add(p->place[p->corner[i][1]], p->place[p->corner[i][2]])),
+        1.0 / 3.0);
 }
 
-/* Finds the triangles beyond a plane across the longest side of the chart's box. A unit's triangles are where
- * its first one is; with `apart`, each is where it is itself. */
-static void find_beyond_plane(const vshi_patch *p, bool apart, double *place, bool *beyond) {
-    const vshi_cut_mesh *s = p->surface;
-    double low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, sum = 0.0;
+static bool share_unit(const splitting *s, uint32_t a, uint32_t b) {
+    const vshi_patch *p = s->patch;
+    return s->whole_units && p->surface->unit[p->triangles[a]] == p->surface->unit[p->triangles[b]];
+}
+
+static double measure_step(const splitting *s, uint32_t a, uint32_t b) {
+    const vshi_patch *p = s->patch;
+    const vshi_cut_mesh *surface = p->surface;
+    const uint32_t ta = p->triangles[a], tb = p->triangles[b];
+    if (share_unit(s, a, b)) {
+        return 0.0;
+    }
+    return vshi_length(vshi_sub(find_middle(p, a), find_middle(p, b))) +
+           s->bend * (1.0 - vshi_dot(surface->normal[ta], surface->normal[tb]));
+}
+
+/* Shortest paths over triangles (Dijkstra, 1959) from the seeds; seeds[i] is owner i. *last is the last
+ * triangle reached. */
+static vsh_result find_paths(splitting *s, const uint32_t *seeds, uint32_t seed_count, uint32_t *last,
+                             vsh_error *error) {
+    const vshi_patch *p = s->patch;
+    s->heap.count = 0;
+    for (uint32_t i = 0; i < p->count; ++i) {
+        s->far[i] = INFINITY;
+        s->owner[i] = VSHI_NONE;
+    }
+    for (uint32_t k = 0; k < seed_count; ++k) {
+        s->far[seeds[k]] = 0.0;
+        VSHI_TRY(vshi_heap_push(&s->heap, 0.0, seeds[k], k, error));
+    }
+    while (s->heap.count > 0) {
+        const vshi_heap_entry next = vshi_heap_pop(&s->heap);
+        if (s->owner[next.what] != VSHI_NONE) {
+            continue;
+        }
+        s->owner[next.what] = next.by;
+        *last = next.what;
+        for (uint32_t side = 3 * next.what; side < 3 * next.what + 3; ++side) {
+            const uint32_t other = p->beyond[side] != VSHI_NONE ? p->beyond[side] / 3 : next.what;
+            if (s->owner[other] != VSHI_NONE) {
+                continue;
+            }
+            const double far = s->far[next.what] + measure_step(s, next.what, other);
+            if (share_unit(s, next.what, other)) { /* comes before everything else */
+                s->far[other] = far;
+                VSHI_TRY(vshi_heap_push(&s->heap, -1.0, other, next.by, error));
+            } else if (far < s->far[other]) {
+                s->far[other] = far;
+                VSHI_TRY(vshi_heap_push(&s->heap, far, other, next.by, error));
+            }
+        }
+    }
+    return VSH_OK;
+}
+
+/* Finds the half of each triangle. *halved is false if all are one unit, which stays together. */
+static vsh_result halve(splitting *s, bool *halved, vsh_error *error) {
+    const vshi_patch *p = s->patch;
+    uint32_t seeds[2] = {0, 0};
+    double size = 0.0;
     for (uint32_t v = 0; v < p->vertex_count; ++v) {
-        vshi_grow_box(low, high, p->place[v]);
+        size = fmax(size, vshi_length(vshi_sub(p->place[v], p->place[0])));
     }
-    int axis = 0;
-    for (int k = 1; k < 3; ++k) {
-        axis = high[k] - low[k] > high[axis] - low[axis] ? k : axis;
-    }
-    for (uint32_t i = 0; i < p->count; ++i) {
-        const uint32_t own = p->triangles[i], first = s->unit_list[s->unit_begin[s->unit[own]]];
-        vshi_vec c[3];
-        vshi_cut_mesh_corners(s, apart ? own : first, c);
-        const vshi_vec middle = vshi_add(c[0], vshi_add(c[1], c[2]));
-        place[i] = axis == 0 ? middle.x : axis == 1 ? middle.y : middle.z;
-        sum += place[i];
-    }
-    for (uint32_t i = 0; i < p->count; ++i) {
-        beyond[i] = place[i] > sum / p->count;
-    }
+    s->bend = BEND * size;
+    VSHI_TRY(find_paths(s, seeds, 1, &seeds[0], error));
+    VSHI_TRY(find_paths(s, seeds, 1, &seeds[1], error));
+    const uint32_t a = p->triangles[seeds[0]], b = p->triangles[seeds[1]];
+    *halved = a != b && (!s->whole_units || p->surface->unit[a] != p->surface->unit[b]);
+    return *halved ? find_paths(s, seeds, 2, &(uint32_t){0}, error) : VSH_OK;
 }
 
 /* Cuts a chart, and adds its parts to those that wait to be laid out. */
 static vsh_result cut(const vshi_patch *p, vshi_patches *waiting, vsh_error *error) {
-    double *place;
-    bool *beyond;
-    uint32_t *part, parts = 1;
-    const vshi_array arrays[] = {VSHI_ARRAY(place, p->count), VSHI_ARRAY(beyond, p->count),
-                                 VSHI_ARRAY(part, p->count)};
+    splitting s = {.patch = p, .whole_units = true};
+    const vshi_array arrays[] = {VSHI_ARRAY(s.far, p->count), VSHI_ARRAY(s.owner, p->count)};
+    bool halved = false;
+    vsh_result result;
     VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, what, error));
-    for (int apart = 0; apart < 2 && parts == 1 && p->depth < FULL_DEPTH; ++apart) {
-        find_beyond_plane(p, apart, place, beyond);
-        parts = vshi_patch_find_parts(p, beyond, part);
+    if (p->depth < FULL_DEPTH) {
+        VSHI_TRY_DONE(halve(&s, &halved, error));
+        if (!halved) {
+            s.whole_units = false;
+            VSHI_TRY_DONE(halve(&s, &halved, error));
+        }
     }
-    for (uint32_t i = 0; i < p->count && parts == 1; ++i) {
-        part[i] = i;
+    for (uint32_t i = 0; i < p->count && !halved; ++i) {
+        s.owner[i] = i;
     }
-    const vsh_result result = vshi_patches_split(p, part, parts > 1 ? parts : p->count, waiting, error);
-    free(place);
+    result = vshi_patches_split(p, s.owner, halved ? 2 : p->count, waiting, error);
+done:
+    free(s.far);
+    free(s.heap.entries);
     return result;
 }
 

@@ -559,16 +559,16 @@ static vsh_result join_all(const making *m, vsh_error *error) {
     return VSH_OK;
 }
 
-static void straighten_shapes(void *user, size_t begin, size_t end) {
+/* A vshi_element_fn over shapes. */
+static vsh_result straighten_shape(void *user, size_t i, vsh_error *error) {
     const making *m = user;
-    for (size_t i = begin; i < end; ++i) {
-        const vshi_shape *shape = &m->shapes->list[i];
-        merging_free(&m->charting[i].merging);
-        for (size_t c = 0; c < shape->patches.count; ++c) {
-            vshi_patch_straighten(&shape->patches.list[c]);
-        }
-        vshi_job_advance(m->job, shape->mesh->triangle_count);
+    vshi_shape *shape = &m->shapes->list[i];
+    merging_free(&m->charting[i].merging);
+    for (size_t c = 0; c < shape->patches.count; ++c) {
+        VSHI_TRY(vshi_patch_straighten(&shape->patches.list[c], error));
     }
+    vshi_job_advance(m->job, shape->mesh->triangle_count);
+    return VSH_OK;
 }
 
 vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_unwrap_options *options, const vsh_run *run,
@@ -587,7 +587,7 @@ vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_unwrap_options *op
     VSHI_TRY_DONE(vshi_parallel_each(m.job, shapes->count, 1, 0, grow_shape, &m, error));
     VSHI_TRY_DONE(lay_out_all(&m, error));
     VSHI_TRY_DONE(join_all(&m, error));
-    VSHI_TRY_DONE(vshi_parallel_for(m.job, shapes->count, 1, 0, straighten_shapes, &m, error));
+    VSHI_TRY_DONE(vshi_parallel_each(m.job, shapes->count, 1, 0, straighten_shape, &m, error));
     result = vshi_job_cancelled(m.job) ? vshi_job_fail_cancelled(m.job, error) : VSH_OK;
 done:
     for (size_t i = 0; i < shapes->count; ++i) {

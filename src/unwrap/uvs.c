@@ -49,6 +49,26 @@ static double sum_flat_areas(const vshi_patch *p) {
     return sum;
 }
 
+/* Numbers the connected parts of a patch in the order of their first triangles: part[count]. */
+static uint32_t find_parts(const vshi_patch *p, uint32_t *part) {
+    uint32_t parts = 0;
+    for (uint32_t i = 0; i < p->count; ++i) {
+        part[i] = i;
+    }
+    for (uint32_t side = 0; side < 3 * p->count; ++side) {
+        if (p->beyond[side] != VSHI_NONE) {
+            vshi_set_join(part, side / 3, p->beyond[side] / 3);
+        }
+    }
+    for (uint32_t i = 0; i < p->count; ++i) {
+        part[i] = vshi_set_of(part, i);
+    }
+    for (uint32_t i = 0; i < p->count; ++i) { /* a root stands before the others of its part */
+        part[i] = part[i] == i ? parts++ : part[part[i]];
+    }
+    return parts;
+}
+
 static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches *patches, vsh_error *error) {
     uint32_t *part = NULL;
     vshi_patches parts = {0};
@@ -56,7 +76,7 @@ static vsh_result add_parts(const vshi_patch *whole, bool mirrored, vshi_patches
     const double scale = sqrt(whole->area / sum_flat_areas(whole));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&part, whole->count, sizeof *part, what, error));
-    VSHI_TRY_DONE(vshi_patches_split(whole, part, vshi_patch_find_parts(whole, NULL, part), &parts, error));
+    VSHI_TRY_DONE(vshi_patches_split(whole, part, find_parts(whole, part), &parts, error));
     while (parts.count > 0) {
         const vshi_patch next = parts.list[--parts.count];
         VSHI_TRY_DONE(vshi_patch_make(whole->surface, next.triangles, next.count, &patch, error));
@@ -126,6 +146,22 @@ typedef struct sums {
     double square; /* of the L2 stretch of each, times its area */
 } sums;
 
+/* Squared L2 stretch of a triangle (Sander and others, "Texture mapping progressive meshes", 2001): half the
+ * sum of the squared lengths on the surface of unit steps along u and v. */
+static double square_stretch(const vshi_vec p[3], const double uv[3][2], double doubled) {
+    vshi_vec along[2];
+    for (int k = 0; k < 2; ++k) { /* derivatives by texel */
+        const int other = 1 - k;
+        const double sign = k == 0 ? 1.0 : -1.0;
+        along[k] = (vshi_vec){0.0, 0.0, 0.0};
+        for (int c = 0; c < 3; ++c) {
+            const double weight = sign * (uv[(c + 1) % 3][other] - uv[(c + 2) % 3][other]) / doubled;
+            along[k] = vshi_add(along[k], vshi_scale(p[c], weight));
+        }
+    }
+    return 0.5 * (vshi_dot(along[0], along[0]) + vshi_dot(along[1], along[1]));
+}
+
 static void add_triangle(const vsh_mesh *mesh, size_t triangle, const double size[2], sums *s) {
     vshi_vec p[3];
     double uv[3][2];
@@ -138,7 +174,7 @@ static void add_triangle(const vsh_mesh *mesh, size_t triangle, const double siz
     const double area = 0.5 * vshi_length(vshi_cross(vshi_sub(p[1], p[0]), vshi_sub(p[2], p[0])));
     const double doubled =
         (uv[1][0] - uv[0][0]) * (uv[2][1] - uv[0][1]) - (uv[2][0] - uv[0][0]) * (uv[1][1] - uv[0][1]);
-    const double square = vshi_stretch_energy(p, (const double(*)[2])uv) / (2.0 * doubled * doubled);
+    const double square = square_stretch(p, (const double(*)[2])uv, doubled);
     if (area > 0.0 && isfinite(square)) {
         s->area += area;
         s->flat += 0.5 * fabs(doubled);

@@ -274,7 +274,7 @@ TEST(triangles_of_a_quad_stay_together) {
     assert_int_equal(count_parted_quads(s), 0);
     for (size_t v = 0; v < s->vertices; ++v) {
         for (int i = 0; i < 3; ++i) {
-            s->positions[v][i] += 0.07F * (float)next_number(&random);
+            s->positions[v][i] += 0.08F * (float)next_number(&random);
         }
     }
     for (size_t q = 0; q < s->triangles / 2; ++q) {
