@@ -3,7 +3,6 @@
  *
  * A set is halved at the median along the longest side of its centres' box, until a block has eight parts, or
  * parts of at most eight spheres. */
-#define _GNU_SOURCE /* qsort_r */
 #include "shapes/spheres.h"
 
 #include "base/decimal.h"
@@ -69,10 +68,31 @@ static int longest_axis(double (*sphere)[4], part p) {
     return longest;
 }
 
-static int compare_places(const void *a, const void *b, void *axis) {
-    const double *p = a, *q = b;
-    const int k = *(const int *)axis;
-    return p[k] != q[k] ? (p[k] < q[k] ? -1 : 1) : memcmp(p, q, 4 * sizeof *p);
+static void swap(double *a, double *b) {
+    double kept[4];
+    memcpy(kept, a, sizeof kept);
+    memcpy(a, b, sizeof kept);
+    memcpy(b, kept, sizeof kept);
+}
+
+/* Moves the spheres that come first along the axis before `nth` (C. A. R. Hoare, "Find", 1961). */
+static void part_at(double (*sphere)[4], part p, size_t nth, int axis) {
+    ptrdiff_t low = (ptrdiff_t)p.begin, high = (ptrdiff_t)p.end - 1, at = (ptrdiff_t)nth;
+    while (low < high) {
+        const double pivot = sphere[low + (high - low) / 2][axis];
+        ptrdiff_t i = low, j = high;
+        while (i <= j) {
+            for (; sphere[i][axis] < pivot; ++i) {
+            }
+            for (; sphere[j][axis] > pivot; --j) {
+            }
+            if (i <= j) {
+                swap(sphere[i++], sphere[j--]);
+            }
+        }
+        low = at > j ? i : low;
+        high = at < i ? j : high;
+    }
 }
 
 /* Cuts a range into at most BALLS parts; returns their number. */
@@ -97,8 +117,7 @@ static size_t cut(double (*sphere)[4], part all, part parts[BALLS]) {
         }
         /* whole blocks to the left, so that hardly any is half empty */
         const size_t left = size <= 2 * BALLS ? BALLS : (size / 2 + BALLS - 1) / BALLS * BALLS;
-        int axis = longest_axis(sphere, p);
-        qsort_r(sphere + p.begin, size, sizeof *sphere, compare_places, &axis);
+        part_at(sphere, p, p.begin + left, longest_axis(sphere, p));
         parts[largest] = (part){p.begin, p.begin + left};
         parts[count++] = (part){p.begin + left, p.end};
     }
