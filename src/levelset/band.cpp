@@ -1,6 +1,7 @@
 #include "levelset/band.h"
 
 #include <algorithm>
+#include <cfloat>
 #include <cmath>
 #include <map>
 
@@ -15,7 +16,10 @@ constexpr int REGION = Band::REGION;
 constexpr int LEAVES = REGION / LEAF;
 // A triangle less high over its longest edge, voxels, counts as that edge: floats cannot resolve its inside.
 constexpr double FLAT = 2e-4;
-// From a leaf's middle to its farthest voxels, along each axis.
+// In bands wider than this, voxels, most triangles within reach of a leaf are nowhere the nearest.
+constexpr double WIDE = 6.0;
+// From a leaf's middle to its farthest voxels, rounded up; the same by axis.
+constexpr float LEAF_RADIUS = 6.07f;
 const Vec3d LEAF_HALF(3.5);
 // A triangle between two neighbouring voxels is at most √3 from either.
 constexpr double PARTING = 1.74;
@@ -186,13 +190,18 @@ Band::Band(const Surface &surface_, double half_width_, Stage &stage)
 // Measures a region's leaves. Places are relative to the region's middle.
 class Band::Measuring {
   public:
-    Measuring(const Band &band_, Region &region_, vshi_leaf_fn *measure_voxels_)
-        : band(band_), region(region_), measure_voxels(measure_voxels_), frames(region.triangles.size()) {}
+    Measuring(const Band &band_, Region &region_, const vshi_leaf_kernel &kernel_)
+        : band(band_), region(region_), kernel(kernel_), frames(region.triangles.size()) {
+        limits.fill(FLT_MAX);
+    }
 
     void measure(bool sides) {
         frame_triangles();
+        if (band.half_width > WIDE) {
+            limit_leaves();
+        }
         list_triangles();
-        for (int leaf = 0; leaf < LEAVES * LEAVES * LEAVES; ++leaf) {
+        for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
             measure_leaf(leaf, sides);
         }
     }
@@ -219,11 +228,28 @@ class Band::Measuring {
         }
     }
 
+    // Finds the largest distance of a leaf's middle from a triangle that may be the nearest of one of its
+    // voxels.
+    void limit_leaves() {
+        for (const vshi_frame &frame : frames) {
+            float distances[VSHI_REGION_LEAVES];
+            kernel.middles(&frame, distances);
+            for (int leaf = 0; leaf < VSHI_REGION_LEAVES; ++leaf) {
+                limits[leaf] = std::min(limits[leaf], distances[leaf] + 2.0f * LEAF_RADIUS);
+            }
+        }
+    }
+
     // Sorts the triangles by leaves.
     void list_triangles() {
         for (uint32_t i = 0; i < frames.size(); ++i) {
+            float distances[VSHI_REGION_LEAVES] = {};
+            if (band.half_width > WIDE) {
+                kernel.middles(&frames[i], distances);
+            }
             for_each_leaf(boxes[i], [&](int leaf) {
-                if (may_reach(frames[i], middle_of(leaf), LEAF_HALF, band.half_width)) {
+                if (distances[leaf] <= limits[leaf] &&
+                    may_reach(frames[i], middle_of(leaf), LEAF_HALF, band.half_width)) {
                     lists[leaf].push_back(i);
                 }
             });
@@ -246,7 +272,7 @@ class Band::Measuring {
         const float place[3] = {float(middle[0]), float(middle[1]), float(middle[2])};
         BandLeaf leaf;
         leaf.distances.reset(near.empty() ? nullptr : new float[VSHI_LEAF_VOXELS]);
-        if (near.empty() || !measure_voxels(frames.data(), near.data(), near.size(), place,
+        if (near.empty() || !kernel.measure(frames.data(), near.data(), near.size(), place,
                                             float(band.half_width), leaf.distances.get())) {
             return;
         }
@@ -266,13 +292,14 @@ class Band::Measuring {
 
     const Band &band;
     Region &region;
-    vshi_leaf_fn *const measure_voxels;
+    const vshi_leaf_kernel &kernel;
     std::vector<vshi_frame> frames;
-    std::vector<Box> boxes;                                            // leaves that each triangle may reach
-    std::array<std::vector<uint32_t>, LEAVES * LEAVES * LEAVES> lists; // frames, by leaf
+    std::vector<Box> boxes;                                      // leaves that each triangle may reach
+    std::array<float, VSHI_REGION_LEAVES> limits;                // of limit_leaves(), for wide bands
+    std::array<std::vector<uint32_t>, VSHI_REGION_LEAVES> lists; // frames, by leaf
 };
 
-void Band::measure(size_t number, bool sides, vshi_leaf_fn *kernel) {
+void Band::measure(size_t number, bool sides, const vshi_leaf_kernel &kernel) {
     Measuring(*this, regions[number], kernel).measure(sides);
     regions[number].triangles = {};
 }

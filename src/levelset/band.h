@@ -52,7 +52,7 @@ class Band {
 
     // Measures the voxels of one region. Threads may measure different regions. With `sides`, leaves get
     // parts and triangles.
-    void measure(size_t region, bool sides, vshi_leaf_fn *kernel);
+    void measure(size_t region, bool sides, const vshi_leaf_kernel &kernel);
 
     // Hands over all leaves with a voxel within the band by origin (x, then y, then z), once every region is
     // measured.

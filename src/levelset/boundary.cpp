@@ -12,8 +12,10 @@ using openvdb::Vec3d;
 constexpr int LEAF = 8;
 // Pieces of triangles are not cut below this, voxels.
 constexpr double PIECE = 1.0;
-// Longer triangles ask whether the stage is cancelled, voxels.
-constexpr double LARGE = 32.0;
+// Longest triangles whose box of cells is tested before they are cut, voxels.
+constexpr double GLANCE = 32.0;
+// Distance of a piece's middle from its triangle by rounding, voxels, with room.
+constexpr double MARGIN = 1e-5;
 using Piece = std::array<openvdb::Vec3s, 3>;
 
 // For each lattice cell of a leaf, at its first voxel: whether one of the eight voxels at its corners is
@@ -73,8 +75,14 @@ class Cutting {
             const Vec3d middle = (corner[0] + corner[1] + corner[2]) / 3.0;
             return is_near_outside(cell_of(middle)) ? Bounds::ALL : Bounds::NOTHING;
         }
-        if (square[longest] >= LARGE * LARGE && stage.cancelled()) {
+        if (square[longest] >= GLANCE * GLANCE && stage.cancelled()) {
             return Bounds::NOTHING; // the result is thrown away
+        }
+        if (square[longest] < GLANCE * GLANCE) {
+            const Bounds glanced = glance(corner);
+            if (glanced != Bounds::SOME) {
+                return glanced;
+            }
         }
         const Vec3d middle = 0.5 * (corner[longest] + corner[(longest + 1) % 3]);
         const Vec3d &from = corner[longest], &to = corner[(longest + 1) % 3],
@@ -90,6 +98,45 @@ class Cutting {
             }
         }
         return Bounds::SOME;
+    }
+
+    // Decides by the cells of a triangle's box, if these are all alike. That settles axis-aligned planes
+    // early.
+    Bounds glance(const Corners &corner) {
+        Cell low, high;
+        for (int axis = 0; axis < 3; ++axis) {
+            const auto ends = std::minmax({corner[0][axis], corner[1][axis], corner[2][axis]});
+            low[axis] = floor_of(ends.first - MARGIN);
+            high[axis] = floor_of(ends.second + MARGIN);
+        }
+        uint64_t inner = 0, outer = 0;
+        constexpr int32_t mask = ~(LEAF - 1);
+        for (int32_t x = low[0] & mask; x <= high[0]; x += LEAF) {
+            for (int32_t y = low[1] & mask; y <= high[1]; y += LEAF) {
+                for (int32_t z = low[2] & mask; z <= high[2]; z += LEAF) {
+                    const uint64_t across = ROW_ENDS * range(low[2], high[2], z, 1);
+                    const uint64_t box = across & range(low[1], high[1], y, LEAF);
+                    const Bits *const leaf = near_of({x, y, z});
+                    const int32_t end = std::min(high[0] - x, LEAF - 1);
+                    for (int32_t i = std::max(low[0] - x, 0); i <= end; ++i) {
+                        const uint64_t word = leaf == nullptr ? 0 : (*leaf)[size_t(i)];
+                        inner |= box & ~word;
+                        outer |= box & word;
+                    }
+                    if (inner != 0 && outer != 0) {
+                        return Bounds::SOME;
+                    }
+                }
+            }
+        }
+        return outer != 0 ? Bounds::ALL : Bounds::NOTHING;
+    }
+
+    // The bits of low … high within a leaf that begins at `origin`, each `width` bits wide.
+    static uint64_t range(int32_t low, int32_t high, int32_t origin, int width) {
+        const int first = std::max(low - origin, 0), last = std::min(high - origin, LEAF - 1);
+        const uint64_t all = width == 1 ? 0xff : ~uint64_t(0);
+        return all >> width * (LEAF - 1 - (last - first)) << width * first;
     }
 
     static int32_t floor_of(double x) {

@@ -381,8 +381,23 @@ class Nearby {
 int side_of(const Halo &halo, const Cell &local, Nearby &nearby) {
     const int at = in_halo(local[0] + 1, local[1] + 1, local[2] + 1);
     const float own = halo.distance[at];
+    // First try the neighbour away from the surface.
     constexpr int stride[3] = {EDGE * EDGE, EDGE, 1};
+    float slope[3], steepest = 0.0f;
+    for (int axis = 0; axis < 3; ++axis) {
+        slope[axis] = halo.distance[at + stride[axis]] - halo.distance[at - stride[axis]];
+        steepest = std::max(steepest, std::fabs(slope[axis]));
+    }
+    int there = at, square = 0;
+    for (int axis = 0; axis < 3; ++axis) {
+        const int step = (slope[axis] > 0.41421f * steepest) - (slope[axis] < -0.41421f * steepest);
+        there += step * stride[axis];
+        square += step & 1;
+    }
     constexpr float length[4] = {0.0f, 1.00001f, 1.41423f, 1.73207f};
+    if (halo.side[there] != 0 && own + halo.distance[there] > length[square]) {
+        return halo.side[there];
+    }
     Known26 known[26];
     int count = 0;
     for (int x = -1; x <= 1; ++x) {

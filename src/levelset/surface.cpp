@@ -16,7 +16,7 @@ class Conversion {
     Conversion(const Surface &surface_, const Lattice &lattice_, double half_width, double begin_,
                double end_, Stage &stage_)
         : surface(surface_), lattice(lattice_), begin(begin_), end(end_), stage(stage_),
-          kernel(VSHI_KERNEL_OF(vshi_leaf, stage.options.isa)), band(surface, half_width, stage) {}
+          kernel(*VSHI_KERNEL_OF(vshi_leaf, stage.options.isa)), band(surface, half_width, stage) {}
 
     FloatGrid::Ptr without_sides() {
         measure(false, 0.8);
@@ -30,7 +30,8 @@ class Conversion {
         sides = find_sides(surface, table, at(0.5), at(0.8), stage);
         measure_boundary(table);
         const FloatGrid::Ptr grid = make_grid();
-        sign_tiles(grid->tree(), stage);
+        constexpr openvdb::Index above_leaves = 1;
+        stage.run([&] { openvdb::tools::signedFloodFill(grid->tree(), true, 1, above_leaves); });
         return grid;
     }
 
@@ -115,18 +116,13 @@ class Conversion {
     const Lattice &lattice;
     const double begin, end;
     Stage &stage;
-    vshi_leaf_fn *const kernel;
+    const vshi_leaf_kernel &kernel;
     Band band;
     std::vector<BandLeaf> leaves;
     std::vector<Sides> sides;
 };
 
 } // namespace
-
-void sign_tiles(FloatTree &tree, Stage &stage) {
-    constexpr openvdb::Index above_leaves = 1;
-    stage.run([&] { openvdb::tools::signedFloodFill(tree, true, 1, above_leaves); });
-}
 
 FloatGrid::Ptr fill_surface(const Surface &surface, const Lattice &lattice, double half_width, double begin,
                             double end, Stage &stage) {
@@ -285,7 +281,7 @@ FloatGrid::Ptr redistance(const FloatGrid &source, const IndexDistance &exact, c
     }
     FloatGrid::Ptr measured =
         measure_surface(surface, lattice, lattice.half_width, begin + 0.3 * (end - begin), end, stage);
-    copy_signs(*measured, stage, [&] {
+    copy_signs(*measured, root_origins(source.constTree()), stage, [&] {
         return [tree = FloatGrid::ConstUnsafeAccessor(source.constTree())](const Coord &at) {
             return tree.getValue(at) < 0.0f;
         };

@@ -74,13 +74,63 @@ Surface mesh_surface(const FloatGrid &source, Stage &stage);
 FloatGrid::Ptr redistance(const FloatGrid &source, const IndexDistance &exact, const Lattice &lattice,
                           double begin, double end, Stage &stage);
 
-// --- signs
+// --- signs of tiles
 
-// Gives each tile the sign of the leaves beside it: no surface lies between them.
-void sign_tiles(FloatTree &tree, Stage &stage);
+constexpr int32_t UPPER_SIZE = int32_t(UpperNode::DIM);
 
-// Gives unsigned distances the signs of the test of voxels that `make_inside()` makes.
-template <typename MakeInside> void copy_signs(FloatGrid &distances, Stage &stage, MakeInside &&make_inside) {
+// Sets the tiles of one node. A tile has one sign, because no surface passes through it.
+template <typename Node, typename Inside> void sign_tiles(Node &node, Inside &&inside, float background) {
+    for (auto tile = node.beginValueAll(); tile; ++tile) {
+        tile.setValue(inside(tile.getCoord()) ? -background : background);
+    }
+    for (auto tile = node.beginValueOn(); tile; ++tile) {
+        tile.setValueOff();
+    }
+}
+
+// Origins of a tree's upper nodes and of its root's tiles.
+inline std::vector<Coord> root_origins(const FloatTree &tree) {
+    std::vector<Coord> origins;
+    std::vector<const UpperNode *> nodes;
+    tree.getNodes(nodes);
+    origins.reserve(nodes.size());
+    for (const UpperNode *node : nodes) {
+        origins.push_back(node->origin());
+    }
+    auto tile = tree.cbeginValueAll();
+    tile.setMaxDepth(0);
+    for (; tile; ++tile) {
+        origins.push_back(tile.getCoord());
+    }
+    return origins;
+}
+
+// Gives every tile of `tree` the sign of its first voxel, by the test that `make_inside()` makes. Adds a tile
+// to the root at each of `origins` that lies inside and has no node. The tree has leaves wherever there is a
+// surface.
+template <typename MakeInside>
+void fill_tiles(FloatTree &tree, const std::vector<Coord> &origins, float background, Stage &stage,
+                MakeInside &&make_inside) {
+    std::vector<LowerNode *> lower;
+    tree.getNodes(lower);
+    stage.loop(lower.size(), 1, 0.0, 0.0,
+               [&](size_t i) { sign_tiles(*lower[i], make_inside(), background); });
+    std::vector<UpperNode *> upper;
+    tree.getNodes(upper);
+    stage.loop(upper.size(), 1, 0.0, 0.0,
+               [&](size_t i) { sign_tiles(*upper[i], make_inside(), background); });
+    auto inside = make_inside();
+    for (const Coord &origin : origins) {
+        if (tree.getValueDepth(origin) < 1 && inside(origin)) {
+            tree.addTile(3, origin, -background, false);
+        }
+    }
+}
+
+// Gives unsigned distances the signs of a test of voxels; parameters as above.
+template <typename MakeInside>
+void copy_signs(FloatGrid &distances, const std::vector<Coord> &origins, Stage &stage,
+                MakeInside &&make_inside) {
     std::vector<Leaf *> leaves;
     distances.tree().getNodes(leaves);
     stage.loop(leaves.size(), 16, 0.0, 0.0, [&](size_t i) {
@@ -90,7 +140,7 @@ template <typename MakeInside> void copy_signs(FloatGrid &distances, Stage &stag
             values[n] = std::copysign(values[n], inside(leaves[i]->offsetToGlobalCoord(n)) ? -1.0f : 1.0f);
         }
     });
-    sign_tiles(distances.tree(), stage);
+    fill_tiles(distances.tree(), origins, distances.background(), stage, make_inside);
 }
 
 } // namespace vshi

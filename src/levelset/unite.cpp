@@ -169,7 +169,11 @@ FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &latt
     });
     FloatGrid::Ptr measured = measure_surface(surface, lattice, lattice.half_width, begin, end, stage);
 
-    copy_signs(*measured, stage, [&] {
+    // Upper nodes of the lattice that the instance's inside may cover without a surface.
+    std::vector<Coord> origins;
+    visit_blocks(measured->evalActiveVoxelBoundingBox(), UPPER_SIZE,
+                 [&](const Coord &origin) { origins.push_back(origin); });
+    copy_signs(*measured, origins, stage, [&] {
         return
             [&, tree = FloatGrid::ConstUnsafeAccessor(placed.grid->level_set->constTree())](const Coord &at) {
                 const Vec3d source = apply_back(placed, lattice.world(at));
@@ -179,15 +183,29 @@ FloatGrid::Ptr resample(const Placed &placed, size_t number, const Lattice &latt
     return measured;
 }
 
-// Origins of the union's leaves: all that a part's leaves touch after the part's shift.
-std::set<Coord> shifted_origins(const std::vector<Part> &parts) {
+// Origins of the union's nodes of `size` voxels: all that a part's nodes touch after the part's shift. `list`
+// gives the origins of a part's nodes.
+template <typename List>
+std::vector<Coord> shifted_origins(const std::vector<Part> &parts, int32_t size, const List &list) {
+    const int32_t last = size - 1;
     std::set<Coord> origins;
     for (const Part &part : parts) {
-        for (auto leaf = part.grid->constTree().cbeginLeaf(); leaf; ++leaf) {
-            const Coord first = leaf->origin() + part.shift;
-            visit_blocks(openvdb::CoordBBox::createCube(first, int32_t(Leaf::DIM)), int32_t(Leaf::DIM),
-                         [&](const Coord &origin) { origins.insert(origin); });
+        for (const Coord &origin : list(part.grid->constTree())) {
+            for (int corner = 0; corner < 8; ++corner) {
+                const Coord at =
+                    origin + part.shift +
+                    Coord((corner & 1) ? last : 0, (corner & 2) ? last : 0, (corner & 4) ? last : 0);
+                origins.insert(at & ~last);
+            }
         }
+    }
+    return std::vector<Coord>(origins.begin(), origins.end());
+}
+
+std::vector<Coord> leaf_origins(const FloatTree &tree) {
+    std::vector<Coord> origins;
+    for (auto leaf = tree.cbeginLeaf(); leaf; ++leaf) {
+        origins.push_back(leaf->origin());
     }
     return origins;
 }
@@ -196,8 +214,10 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
                            Stage &stage) {
     const float background = lattice.background();
     FloatGrid::Ptr united = FloatGrid::create(background);
+    const std::vector<Coord> origins = shifted_origins(parts, int32_t(Leaf::DIM), leaf_origins);
     std::vector<Leaf *> leaves;
-    for (const Coord &origin : shifted_origins(parts)) {
+    leaves.reserve(origins.size());
+    for (const Coord &origin : origins) {
         leaves.push_back(united->tree().touchLeaf(origin));
     }
     stage.loop(leaves.size(), 16, begin, 1.0, [&](size_t i) {
@@ -210,7 +230,21 @@ FloatGrid::Ptr unite_parts(const std::vector<Part> &parts, const Lattice &lattic
             }
         }
     });
-    sign_tiles(united->tree(), stage);
+    fill_tiles(united->tree(), shifted_origins(parts, UPPER_SIZE, root_origins), background, stage, [&] {
+        std::vector<FloatGrid::ConstUnsafeAccessor> trees;
+        trees.reserve(parts.size());
+        for (const Part &part : parts) {
+            trees.emplace_back(part.grid->constTree());
+        }
+        return [&parts, trees](const Coord &at) {
+            for (size_t i = 0; i < parts.size(); ++i) {
+                if (trees[i].getValue(at - parts[i].shift) < 0.0f) {
+                    return true;
+                }
+            }
+            return false;
+        };
+    });
     return united;
 }
 

@@ -17,7 +17,8 @@ enum {
     VSHI_FRAME_BESIDE = 1,
     VSHI_FRAME_ALONG = 4,
     VSHI_FRAME_ROWS = 7,
-    VSHI_LEAF_VOXELS = 512
+    VSHI_LEAF_VOXELS = 512,
+    VSHI_REGION_LEAVES = 64
 };
 
 typedef struct vshi_frame {
@@ -26,16 +27,22 @@ typedef struct vshi_frame {
     float high[3];
 } vshi_frame;
 
-/* Measures the distance of a leaf's 8³ voxels (stored x · 64 + y · 8 + z) to the nearest of `count` triangles
- * frames[list[i]], voxels, at most `reach`. `middle` is the leaf's, relative to the region's. Returns whether
- * a distance is below `reach`. Exact to 1e-4 of a voxel. */
-typedef int vshi_leaf_fn(const vshi_frame *frames, const uint32_t *list, size_t count, const float middle[3],
-                         float reach, float distances[VSHI_LEAF_VOXELS]);
+typedef struct vshi_leaf_kernel {
+    /* Measures the distance of a leaf's 8³ voxels (stored x · 64 + y · 8 + z) to the nearest of `count`
+     * triangles frames[list[i]], voxels, at most `reach`. `middle` is the leaf's, relative to the region's.
+     * Returns whether a distance is below `reach`. Exact to 1e-4 of a voxel. */
+    int (*measure)(const vshi_frame *frames, const uint32_t *list, size_t count, const float middle[3],
+                   float reach, float distances[VSHI_LEAF_VOXELS]);
+    /* Measures the distances of the middles of a region's 4³ leaves (stored x · 16 + y · 4 + z) to one
+     * triangle. */
+    void (*middles)(const vshi_frame *frame, float distances[VSHI_REGION_LEAVES]);
+} vshi_leaf_kernel;
 
 /* One source (leaf.inc), built for each instruction set; all give the same bits. Thread safe. */
-extern VSHI_SHARED vshi_leaf_fn vshi_leaf_base;
+extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_base;
 #if defined(__x86_64__)
-extern VSHI_SHARED vshi_leaf_fn vshi_leaf_avx2, vshi_leaf_avx512;
+extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_avx2;
+extern VSHI_SHARED const vshi_leaf_kernel vshi_leaf_avx512;
 #endif
 
 VSH_END_C
