@@ -320,6 +320,31 @@ TEST(turned_and_mirrored_grids_stay_where_they_are) {
     assert_same(turned.grid, back);
 }
 
+// Some programs cut level sets and leave no surface at the cut. On another lattice the cut is off by at most
+// a leaf.
+TEST(a_cut_level_set_does_not_leak) {
+    const FloatGrid::Ptr half = sphere();
+    half->tree().clip(openvdb::CoordBBox(openvdb::Coord(-40), openvdb::Coord(7, 40, 40)));
+    const Saved cut("half.vdb", {half});
+    const vsh_grid_instance instance = {cut.grid, nullptr};
+    vsh_grid_options options = vsh_grid_options_default();
+    options.voxel_size = 0.6 * VOXEL;
+    OWNED(vsh_grid) *finer = nullptr;
+    FloatGrid::ConstPtr distances;
+    assert_ok(vsh_grid_unite(&instance, 1, &options, nullptr, &finer, &failure));
+    assert_ok(vsh_grid_to_openvdb(finer, OPENVDB_LIBRARY_VERSION_NUMBER, OPENVDB_ABI_VERSION_NUMBER,
+                                  &distances, &failure));
+    const double leaf = 8.0 * options.voxel_size;
+    for (double x = -2.0; x < 2.0; x += 0.05) {
+        const openvdb::Vec3d place(x, 0.01, 0.01);
+        const float found =
+            distances->tree().getValue(distances->transform().worldToIndexCellCentered(place));
+        if (std::fabs(x + RADIUS) > 0.1 && std::fabs(x - 7.5 * VOXEL) > leaf) {
+            assert_that((found < 0.0f) == (x > -RADIUS && x < 7.5 * VOXEL), "%g at %g", double(found), x);
+        }
+    }
+}
+
 TEST(doubles_are_read_and_values_that_are_no_distances_are_made_so) {
     const FloatGrid::Ptr scaled = sphere(), turned = sphere(2.0f), wide = sphere();
     scale_values(*scaled, 0.3f); // the background stays
