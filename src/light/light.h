@@ -33,7 +33,7 @@ typedef struct vshi_light_place {
     double tangent;                 /* of the half angle */
     vshi_vec centre;                /* not directional */
     double radius;                  /* of the sphere around the whole light; 0 for directional lights */
-    double reach;                   /* of a quadratic falloff; else infinite */
+    double reach;                   /* infinite without a quadratic falloff */
     vshi_vec beam;                  /* spot: unit, the way it shines */
     double outer;                   /* spot: half angle of its cone; else infinite */
     double rim;                     /* its cosine; else -infinite */

@@ -70,7 +70,7 @@ typedef struct making {
     uint32_t *parent;   /* [unknowns]: union-find, then the island */
     uint32_t *number;   /* [unknowns]: island by island */
     seam_row *unsorted; /* [places] */
-    size_t page;        /* whose owners are found */
+    size_t page;        /* the current one of a pass that finds owners */
 } making;
 
 /* Texels that a lookup reads, and their weights in 2^-24. */

@@ -74,7 +74,7 @@ typedef struct vshi_ao_values {
 typedef struct vshi_ao_task {
     const vsh_field *field;
     const vshi_triangles *triangles; /* of exact methods; else may be NULL */
-    vshi_layers *layers;             /* beside the field; NULL: none */
+    vshi_layers *layers;             /* layers beside the field; NULL: none */
     vsh_shade_options options;       /* settled */
     vshi_sampler *sampler;           /* of methods by rays; else NULL */
     vshi_ao_cones *cones;            /* of the method of cones; else NULL */

@@ -450,6 +450,9 @@ static void shoot_piece(ray_piece *piece, vsh_shade_stats *stats) {
 }
 
 static vshi_vec bent_of(const ray_piece *piece, const point_rays *point) {
+    if (piece->task->values.bent == NULL) {
+        return (vshi_vec){0.0, 0.0, 0.0};
+    }
     const vshi_vec *axes = piece->exact ? point->world_axes : point->frame.axes;
     const vshi_vec mean =
         vshi_ao_mean(point->open, vshi_ao_direction(axes, point->all), point->free, point->taken, axes[2]);

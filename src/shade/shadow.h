@@ -9,7 +9,7 @@
 typedef struct vshi_shadow_task {
     const vsh_field *field;
     const vshi_triangles *triangles; /* of exact methods; else may be NULL */
-    vshi_layers *layers;             /* beside the field; NULL: none */
+    vshi_layers *layers;             /* layers beside the field; NULL: none */
     const vsh_light *light;
     vsh_shade_options options; /* settled */
     vshi_sampler *sampler;     /* of methods by rays; else NULL */

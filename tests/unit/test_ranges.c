@@ -1,6 +1,7 @@
 /* The ends of every range that a scene has, by every method: options, voxels, bands, AO distances, steps,
- * receivers, normals and lights. A value there is a closed form, or the one in the middle of the range, or
- * refused by name. docs/accuracy.md has the bounds. test_light.c has lights that are refused. */
+ * receivers, normals and lights. There, values equal a closed form or those of the middle of the range, or
+ * the call names what it refuses. docs/accuracy.md has the bounds. test_light.c has lights that are refused.
+ */
 #include "rays.h"
 #include "testing.h"
 #include "traced.h"

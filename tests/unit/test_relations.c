@@ -222,7 +222,7 @@ TEST(moved_by_whole_voxels_every_bit_stays_and_far_away_the_picture) {
             const int kind = kind_of(k);
             const bool whole = kind == VSH_SHADOW_HARD || by_rays(kind);
             if (far && k == SHADOW_METHODS + VSH_SHADOW_IMPROVED) {
-                continue; /* of a lamp, triangulation takes two samples for one surface here and there */
+                continue; /* under a lamp, it sometimes takes two samples for one surface */
             }
             assert_true(all[k].rms <= (!far ? 0.0 : kind == VSH_SHADOW_HARD ? 0.016 : whole ? 5e-3 : 1e-4));
             assert_true(whole || all[k].worst <= (far ? 2e-3 : 0.0));

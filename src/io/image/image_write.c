@@ -172,8 +172,8 @@ static vsh_result parse_pack(const char *text, const vsh_image *image, pack made
     }
 }
 
-/* Writes the default packing as text: irradiance.R, .G and .B, or else the first three channels that are not
- * "A" to R, G, B (one alone: to R, G and B), "A" to A, which is left out where the format has no alpha. */
+/* Writes the default packing as text. R, G and B hold the irradiance, or else the first three channels; a
+ * single channel fills all three. A holds "A". It is left out where the format has no alpha. */
 static void write_default_pack(const vsh_image *image, char *text, size_t capacity) {
     const char *colors[3] = {NULL, NULL, NULL};
     const char *alpha = NULL;
