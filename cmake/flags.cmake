@@ -60,6 +60,8 @@ function(vsh_add_kernels target)
     vsh_add_kernel(${target} lanes_${kind} shade/kernel/lanes.inc "${flags}"
                    "#define KERNEL_NAME vshi_kernel_${kind}\n#define MARCH_LANES ${lanes}\n#define MARCH_WIDTH ${width}\n")
     if(NOT kind STREQUAL few)
+      math(EXPR half "${width} / 2")
+      vsh_add_kernel(${target} windows_${kind} shade/kernel/windows.inc "${flags}" "#define WINDOW_NAME vshi_windows_${kind}\n#define WINDOW_WIDTH ${half}\n")
       vsh_add_kernel(${target} leaf_${kind} levelset/kernel/leaf.inc "${flags}" "#define LEAF_NAME vshi_leaf_${kind}\n")
       vsh_add_kernel(${target} feet_${kind} field/kernel/feet.inc "${flags}" "#define FEET_NAME vshi_feet_${kind}\n#define FEET_WIDTH ${width}\n")
     endif()

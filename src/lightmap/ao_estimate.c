@@ -87,6 +87,7 @@ typedef struct estimating {
     const vsh_shade_options *shade;
     float *values, *bent;
     ao_plane *planes;
+    int32_t isa;
     int32_t spacing; /* of the current lattice */
     row_sum *sums;   /* [rows of cells] */
 } estimating;
@@ -121,7 +122,7 @@ static bool find_texels(const estimating *s, block *b) {
 static void lay_out(const estimating *s, block *b) {
     const int32_t sampler = vshi_ao_tile_sampler(s->shade->sampler);
     memset(b->texels, 0, sizeof b->texels);
-    b->windows = (vshi_windows){WIDTH, WIDTH, b->texels, b->sums};
+    b->windows = (vshi_windows){WIDTH, WIDTH, b->texels, b->sums, s->isa};
     int32_t rays = 0;
     float spread = 0.0f;
     for (size_t k = 0; k < TEXELS; ++k) {
@@ -174,32 +175,44 @@ static void bend(const estimating *s, const block *b, const vshi_window_estimate
 
 /* Estimates by windows across tiles. If these know too little for the texel's tile, by the tile's own
  * windows. */
-static vshi_window_estimate estimate(const estimating *s, const block *b, int32_t x, int32_t y) {
+static void estimate(const estimating *s, const block *b, const uint16_t *places, size_t count,
+                     vshi_window_estimate *estimates) {
     const double max_error = s->shade->max_error;
-    const vshi_window_estimate e = vshi_windows_estimate(&b->windows, x, y, max_error, 0);
-    if (e.centred <= VSHI_AO_TILE_ENOUGH * max_error) {
-        return e;
+    uint16_t unsure[INNER];
+    size_t of[INNER], unsure_count = 0;
+    vshi_window_estimate own[INNER];
+    vshi_windows_estimate(&b->windows, places, count, max_error, 0, estimates);
+    for (size_t k = 0; k < count; ++k) {
+        if (!(estimates[k].centred <= VSHI_AO_TILE_ENOUGH * max_error)) {
+            unsure[unsure_count] = places[k];
+            of[unsure_count++] = k;
+        }
     }
-    const vshi_window_estimate own = vshi_windows_estimate(&b->windows, x, y, max_error, VSHI_CELL);
-    return own.centred < e.centred ? own : e;
+    vshi_windows_estimate(&b->windows, unsure, unsure_count, max_error, VSHI_CELL, own);
+    for (size_t k = 0; k < unsure_count; ++k) {
+        estimates[of[k]] = own[k].centred < estimates[of[k]].centred ? own[k] : estimates[of[k]];
+    }
 }
 
-static void estimate_own(const estimating *s, const block *b) {
+static void estimate_row(const estimating *s, const block *b, int32_t y) {
     const float part = 1.0f / (float)s->spacing;
-    for (int32_t y = VSHI_CELL; y < VSHI_CELL + INNER; ++y) {
-        for (int32_t x = VSHI_CELL; x < VSHI_CELL + INNER; ++x) {
-            const size_t at = b->at[y * WIDTH + x];
-            if (!is_own(s, at)) {
-                continue;
-            }
-            const size_t i = at - 1;
-            const vshi_window_estimate e = estimate(s, b, x, y);
-            s->values[i] = (float)e.value;
-            s->planes[i] = (ao_plane){
-                {part * (float)e.slope[0], part * (float)e.slope[1]}, (float)e.deviation, (float)e.curved};
-            if (s->bent != NULL) {
-                bend(s, b, &e, x, y, s->bent + 3 * i);
-            }
+    uint16_t places[INNER];
+    size_t count = 0;
+    vshi_window_estimate estimates[INNER];
+    for (int32_t at = y * WIDTH + VSHI_CELL; at < y * WIDTH + VSHI_CELL + INNER; ++at) {
+        if (is_own(s, b->at[at])) {
+            places[count++] = (uint16_t)at;
+        }
+    }
+    estimate(s, b, places, count, estimates);
+    for (size_t k = 0; k < count; ++k) {
+        const vshi_window_estimate *e = &estimates[k];
+        const size_t i = b->at[places[k]] - 1;
+        s->values[i] = (float)e->value;
+        s->planes[i] = (ao_plane){
+            {part * (float)e->slope[0], part * (float)e->slope[1]}, (float)e->deviation, (float)e->curved};
+        if (s->bent != NULL) {
+            bend(s, b, e, places[k] % WIDTH, y, s->bent + 3 * i);
         }
     }
 }
@@ -214,7 +227,7 @@ static vsh_result estimate_block(void *user, size_t number, vsh_error *error) {
     const estimating *s = user;
     const size_t columns = blocks_across(s->map.width, s->spacing);
     const int32_t side = INNER * s->spacing, beside = VSHI_CELL * s->spacing;
-    block *b = malloc(sizeof *b);
+    block *b = aligned_alloc(_Alignof(block), sizeof *b);
     if (b == NULL) {
         return vshi_fail(error, VSH_ERROR_MEMORY, "AO texels: the system refused memory");
     }
@@ -222,7 +235,9 @@ static vsh_result estimate_block(void *user, size_t number, vsh_error *error) {
                                       (int32_t)(number / columns) * side - beside, s->spacing, WIDTH, WIDTH};
     if (find_texels(s, b)) {
         lay_out(s, b);
-        estimate_own(s, b);
+        for (int32_t y = VSHI_CELL; y < VSHI_CELL + INNER; ++y) {
+            estimate_row(s, b, y);
+        }
     }
     free(b);
     return VSH_OK;
@@ -390,6 +405,7 @@ static vsh_result estimate_all(const vshi_page *page, const vshi_shots *shots, f
                             .normal = page->normal},
                     .shots = shots,
                     .shade = &page->shade,
+                    .isa = run->isa,
                     .values = values,
                     .planes = planes,
                     .bent = bent};

@@ -388,6 +388,7 @@ vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options 
     const vsh_result result = vshi_ao_prepare(occluders, &full, shading.sphere, task, error);
     task->layers = layers;
     task->kernel = vshi_kernel_of(isa);
+    task->isa = isa;
     task->outside = shading.outside;
     return result;
 }

@@ -83,7 +83,8 @@ typedef struct vshi_ao_task {
     bool sphere;                     /* in free space: all directions alike, no normals, no start offset */
     vshi_vec up;               /* unit, world space: only directions above its horizon count; zero: all do */
     const vshi_kernel *kernel; /* this and the next members belong to one call */
-    bool outside;              /* no point lies in a solid: samples of a lightmap */
+    int32_t isa;
+    bool outside; /* no point lies in a solid: samples of a lightmap */
     const vsh_points *points;
     const float *faces; /* [count][3], unit: normals of the faces under points with smooth normals. Directions
                          * below the face do not count. NULL: the points' normals */

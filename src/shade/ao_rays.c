@@ -559,7 +559,9 @@ static bool decide_tile(ray_piece *piece, tile *t, int32_t most) {
         }
     }
     vshi_windows_sum(&t->windows);
-    bool more = false;
+    uint16_t places[TILE * TILE];
+    size_t of[TILE * TILE], count = 0;
+    vshi_window_estimate estimates[TILE * TILE];
     for (size_t i = 0; i < piece->count; ++i) {
         point_rays *point = &piece->points[i];
         if (point->next == 0) { /* testing known texels again takes the time that it gains */
@@ -567,13 +569,17 @@ static bool decide_tile(ray_piece *piece, tile *t, int32_t most) {
         }
         point->next = 0;
         if (point->taken < most) {
-            const int32_t at = t->place[i];
-            const vshi_window_estimate e =
-                vshi_windows_estimate(&t->windows, at % TILE, at / TILE, options->max_error, 0);
-            if (e.centred > VSHI_AO_TILE_ENOUGH * options->max_error) {
-                point->next = 2 * point->taken < most ? 2 * point->taken : most;
-                more = true;
-            }
+            places[count] = t->place[i];
+            of[count++] = i;
+        }
+    }
+    vshi_windows_estimate(&t->windows, places, count, options->max_error, 0, estimates);
+    bool more = false;
+    for (size_t k = 0; k < count; ++k) {
+        point_rays *point = &piece->points[of[k]];
+        if (estimates[k].centred > VSHI_AO_TILE_ENOUGH * options->max_error) {
+            point->next = 2 * point->taken < most ? 2 * point->taken : most;
+            more = true;
         }
     }
     return more;
@@ -607,7 +613,7 @@ static int32_t in_curve(int32_t n) {
 static void open_tile(const vshi_ao_task *task, const vshi_texel_lattice *lattice, tile *t) {
     const vshi_ao_share *share = task->share;
     t->lattice = *lattice;
-    t->windows = (vshi_windows){TILE, TILE, t->texels, t->sums};
+    t->windows = (vshi_windows){TILE, TILE, t->texels, t->sums, task->isa};
     t->count = 0;
     bool any = false;
     for (int32_t k = 0; k < TILE * TILE; ++k) {
@@ -781,11 +787,11 @@ static void grade(const vshi_ao_task *task, const int32_t square[2], const tile 
     const int32_t spacing = t->lattice.spacing;
     const double max_error = task->options.max_error, most = BEND * max_error;
     vshi_window_estimate e[TILE * TILE];
-    for (int32_t k = 0; k < TILE * TILE; ++k) {
-        if (t->texels[k].rays > 0) {
-            e[k] = vshi_windows_estimate(&t->windows, k % TILE, k / TILE, max_error, 0);
-        }
+    uint16_t places[TILE * TILE];
+    for (uint16_t k = 0; k < TILE * TILE; ++k) { /* those without rays are not looked at */
+        places[k] = k;
     }
+    vshi_windows_estimate(&t->windows, places, TILE * TILE, max_error, 0, e);
     for (int32_t k = 0; k < TILE * TILE; ++k) {
         if (t->texels[k].rays > 0 && share->level[t->at[k] - 1] == spacing &&
             ((e[k].x[1] - e[k].x[0] + 1 < SPAN && !is_straight(t, e, k, 1, most)) ||

@@ -12,10 +12,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum {
-    VSHI_WINDOW_REACH = 7, /* texels that a window extends beyond its texel, at most */
-    VSHI_WINDOW_SUMS = 6
-};
+enum { VSHI_WINDOW_REACH = 7 /* texels that a window extends beyond its texel, at most */ };
 
 /* A share of rays that are free. `rays` 0: there is no such texel. */
 typedef struct vshi_window_texel {
@@ -23,6 +20,7 @@ typedef struct vshi_window_texel {
     float spread;        /* variance of a value near p, over p (1 - p) */
     int32_t rays;        /* behind the value */
     float step[2];       /* world length of the step to the texel on the left, and above; INFINITY: no link */
+    float shortest;      /* of the steps from the texel */
     uint8_t left, above; /* 1: linked to the texel there; both have values */
     uint8_t run[4];      /* linked texels left, right, up and down, at most VSHI_WINDOW_REACH: set by
                           * vshi_windows_sum() */
@@ -66,10 +64,25 @@ bool vshi_links_lead(const vshi_texel_map *map, const int32_t from[2], const int
 
 /* --- windows */
 
+/* Sums over texels. Breaks are squares of 2 × 2 texels that are not linked. */
+enum {
+    VSHI_WINDOW_VALUES,
+    VSHI_WINDOW_VALUES_X,
+    VSHI_WINDOW_VALUES_Y,
+    VSHI_WINDOW_SQUARES,
+    VSHI_WINDOW_SPREADS,
+    VSHI_WINDOW_RAYS,
+    VSHI_WINDOW_BREAKS,
+    VSHI_WINDOW_SUMS = 8 /* a line of the cache */
+};
+
+/* Values and spreads are summed as multiples of these. */
+#define VSHI_WINDOW_UNIT 0x1p-24
+#define VSHI_WINDOW_SPREAD_UNIT 0x1p-40
+
 /* Sums over all texels left of and above a corner. */
 typedef struct vshi_window_sums {
-    uint64_t of[VSHI_WINDOW_SUMS];
-    uint32_t breaks; /* squares of 2 × 2 texels that are not linked */
+    _Alignas(64) uint64_t of[VSHI_WINDOW_SUMS];
 } vshi_window_sums;
 
 /* A rectangle of texels. */
@@ -77,6 +90,7 @@ typedef struct vshi_windows {
     int32_t width, height;
     vshi_window_texel *texels; /* [height][width] */
     vshi_window_sums *sums;    /* [height + 1][width + 1] */
+    int32_t isa;               /* VSH_ISA_…, for estimates; every one gives the same bits */
 } vshi_windows;
 
 typedef struct vshi_window_estimate {
@@ -93,10 +107,18 @@ typedef struct vshi_window_estimate {
 /* Fills runs and sums. */
 void vshi_windows_sum(vshi_windows *windows);
 
-/* Estimates texel (x, y), which has rays. Estimates that differ by a tenth of `max_error` agree. Windows stay
- * in the texel's square of `tile` × `tile` texels, aligned to multiples of `tile`; 0: anywhere. */
-vshi_window_estimate vshi_windows_estimate(const vshi_windows *windows, int32_t x, int32_t y,
-                                           double max_error, int32_t tile);
+/* Estimates texels (places in [height][width]) that have rays. Estimates that differ by a tenth of
+ * `max_error` agree. Windows stay in the texel's square of `tile` × `tile` texels, aligned to multiples of
+ * `tile`; 0: anywhere. Thread safe. */
+typedef void vshi_windows_fn(const vshi_windows *windows, const uint16_t *texels, size_t count,
+                             double max_error, int32_t tile, vshi_window_estimate *estimates);
+vshi_windows_fn vshi_windows_estimate;
+
+/* One source (windows.inc), built for each instruction set. */
+extern vshi_windows_fn vshi_windows_base;
+#if defined(__x86_64__)
+extern vshi_windows_fn vshi_windows_avx2, vshi_windows_avx512;
+#endif
 
 /* The weight of texel (column, row) in a window's estimate of texel (x, y). */
 double vshi_window_weight(const vshi_window_estimate *estimate, int32_t x, int32_t y, int32_t column,

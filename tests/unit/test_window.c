@@ -19,8 +19,9 @@ typedef struct table {
 /* Texels that all hang together, of so many rays and no value. */
 static table *make_table(int32_t width, int32_t height, int32_t rays) {
     assert_true(width * height <= TEXELS && (width + 1) * (height + 1) <= (EDGE + 1) * (EDGE + 1));
-    table *t = calloc(1, sizeof *t);
-    t->windows = (vshi_windows){width, height, t->texels, t->sums};
+    table *t = aligned_alloc(_Alignof(table), sizeof *t);
+    memset(t, 0, sizeof *t);
+    t->windows = (vshi_windows){width, height, t->texels, t->sums, VSH_ISA_BEST};
     for (int32_t y = 0; y < height; ++y) {
         for (int32_t x = 0; x < width; ++x) {
             t->texels[y * width + x] = (vshi_window_texel){
@@ -35,7 +36,10 @@ static vshi_window_texel *texel_at(table *t, int32_t x, int32_t y) {
 }
 
 static vshi_window_estimate estimate_at(const table *t, int32_t x, int32_t y) {
-    return vshi_windows_estimate(&t->windows, x, y, MAX_ERROR, 0);
+    vshi_window_estimate e;
+    vshi_windows_estimate(&t->windows, &(uint16_t){(uint16_t)(y * t->windows.width + x)}, 1, MAX_ERROR, 0,
+                          &e);
+    return e;
 }
 
 /* The share of a texel's rays that are free where each is by the chance p. */
