@@ -11,28 +11,25 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/mman.h>
-
-/* Opens the module in a folder below this library's; NULL: it is not there. */
-static void *open_beside(const char *folder, const char *file) {
-    static const char of_this_library = 0;
-    Dl_info here;
-    char path[4096];
-    const bool known = dladdr(&of_this_library, &here) != 0 && here.dli_fname != NULL;
-    /* the host may have left the folder that a relative path begins at */
-    const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
-    if (end == NULL || (size_t)snprintf(path, sizeof path, "%.*s/%s%s", (int)(end - here.dli_fname),
-                                        here.dli_fname, folder, file) >= sizeof path) {
-        return NULL;
-    }
-    return dlopen(path, RTLD_LAZY | RTLD_LOCAL);
-}
+#include <unistd.h>
 
 /* Searches beside this library (as built), in its folder vdbshade (as installed), then on the loader's path.
  * In a host with a sanitizer, which replaces dlopen(), the loader does not search beside this library. */
 static void *open_module(const char *file) {
-    void *module = open_beside("", file);
-    module = module != NULL ? module : open_beside("vdbshade/", file);
-    return module != NULL ? module : dlopen(file, RTLD_LAZY | RTLD_LOCAL);
+    static const char of_this_library = 0, *const folders[] = {"", "vdbshade/"};
+    Dl_info here;
+    const bool known = dladdr(&of_this_library, &here) != 0 && here.dli_fname != NULL;
+    /* the host may have left the folder that a relative path begins at */
+    const char *end = known && here.dli_fname[0] == '/' ? strrchr(here.dli_fname, '/') : NULL;
+    for (size_t i = 0; end != NULL && i < sizeof folders / sizeof folders[0]; ++i) {
+        char path[4096];
+        const int length = snprintf(path, sizeof path, "%.*s/%s%s", (int)(end - here.dli_fname),
+                                    here.dli_fname, folders[i], file);
+        if (length > 0 && (size_t)length < sizeof path && access(path, F_OK) == 0) {
+            return dlopen(path, RTLD_LAZY | RTLD_LOCAL); /* if it fails, dlerror() names what is missing */
+        }
+    }
+    return dlopen(file, RTLD_LAZY | RTLD_LOCAL);
 }
 
 static bool has_room(size_t bytes) {
@@ -72,8 +69,9 @@ static vsh_result load(vshi_module *module, vsh_error *error) {
     const void *table = opened != NULL ? dlsym(opened, module->symbol) : NULL;
     if (table == NULL) {
         const char *why = dlerror();
-        return vshi_fail(error, VSH_ERROR_UNSUPPORTED, "%s: need a module that cannot be loaded: %s",
-                         module->what, why != NULL ? why : module->file);
+        return vshi_fail(error, VSH_ERROR_UNSUPPORTED,
+                         "%s: need %s, missing here or left out of this build: %s", module->what,
+                         module->libraries, why != NULL ? why : module->file);
     }
     const char *version = *(const char *const *)table;
     if (strcmp(version, VSHI_VERSION) != 0) {

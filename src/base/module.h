@@ -6,18 +6,19 @@
 #include <vdbshade/base.h>
 
 typedef struct vshi_module {
-    const char *what;   /* the inputs that need it: "level sets" */
-    const char *file;   /* searched beside this library, then on the loader's path */
-    const char *symbol; /* its table; the first member is the version of the headers it was built with */
-    size_t room;        /* bytes of memory for loading */
-    int32_t threads;    /* begun by its libraries */
+    const char *what;      /* the inputs that need it: "level sets" */
+    const char *libraries; /* the libraries it is linked with: "OpenVDB" */
+    const char *file;      /* searched beside this library, then on the loader's path */
+    const char *symbol;    /* its table; the first member is the version of the headers it was built with */
+    size_t room;           /* bytes of memory for loading */
+    int32_t threads;       /* begun by its libraries */
     pthread_mutex_t lock;
     _Atomic(const void *) table;
 } vshi_module;
 
-#define VSHI_MODULE(what, name, room, threads)                                                               \
+#define VSHI_MODULE(what, libraries, name, room, threads)                                                    \
     {                                                                                                        \
-        what, "libvdbshade_" name ".so." VSHI_SOVERSION, "vshi_" name "_module", room, threads,              \
+        what, libraries, "libvdbshade_" name ".so." VSHI_SOVERSION, "vshi_" name "_module", room, threads,   \
             PTHREAD_MUTEX_INITIALIZER, NULL                                                                  \
     }
 

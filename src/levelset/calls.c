@@ -4,7 +4,7 @@
 #include "base/module.h"
 #include "base/threads.h"
 
-static vshi_module module = VSHI_MODULE("level sets", "openvdb", 48 << 20, VSHI_OPENVDB_THREADS);
+static vshi_module module = VSHI_MODULE("level sets", "OpenVDB", "openvdb", 48 << 20, VSHI_OPENVDB_THREADS);
 
 static const vshi_openvdb_table *get_table(void) {
     return vshi_module_table(&module);

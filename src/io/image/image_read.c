@@ -101,7 +101,8 @@ void vsh_image_free(vsh_image_file *file) {
 /* --- OpenImageIO is loaded when the first file needs it. It brings 240 libraries of formats; loading them
  * takes longer (0.2 s) than a small bake, and most runs use only EXR and PNG. */
 
-static vshi_module module = VSHI_MODULE("images of this kind", "oiio", 128 << 20, VSHI_OPENVDB_THREADS);
+static vshi_module module =
+    VSHI_MODULE("images of this kind", "OpenImageIO", "oiio", 128 << 20, VSHI_OPENVDB_THREADS);
 
 vsh_result vshi_oiio_load(const char *path, vsh_error *error) {
     vsh_error why;

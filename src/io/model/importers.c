@@ -4,7 +4,7 @@
 #include "io/model/importers.h"
 #include "base/module.h"
 
-static vshi_module module = VSHI_MODULE("models of this kind", "importers", 16 << 20, 0);
+static vshi_module module = VSHI_MODULE("models of this kind", "Assimp and Draco", "importers", 16 << 20, 0);
 
 vsh_result vshi_importers_load(vsh_error *error) {
     return vshi_module_load(&module, error);
