@@ -474,7 +474,7 @@ def seams(truth_rays=1024):
                         yield [asset, size, channel, what, len(places), *(f"{rank:.6f}" for rank in ranks), f"{seconds:.3f}"]
 
 
-# --- calls: time of a call from Python and of the same call from C (tests/python/points.c)
+# --- calls: time of a call from Python and of the same call from C (points.c)
 
 def nanoseconds(function, calls=20000):
     """Median seconds of one call over five runs."""
@@ -492,7 +492,7 @@ def calls(rounds=7, million=1000000):
         path = pathlib.Path(folder) / "points"
         path.write_bytes(positions.tobytes() + normals.tobytes())
         for _ in range(rounds):
-            told = subprocess.run([BUILD / "bench/vsh_points", model, path, "time", "2"], check=True, capture_output=True, text=True).stdout
+            told = subprocess.run([BUILD / "bench/vsh_points", model, path, "2"], check=True, capture_output=True, text=True).stdout
             of_c.append([float(t) for t in told.split()[1:]])  # the first one is not measured, of either
             query.points(positions, normals, run=ONE)
             of_python.append(timed(query.points, positions, normals, run=ONE)[0])

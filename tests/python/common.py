@@ -12,7 +12,6 @@ import vdbshade
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 ASSETS = ROOT / "assets"
 VDBSHADE = os.environ["VDBSHADE"]  # the command line
-POINTS = os.environ["POINTS"]  # points.c
 
 BOX = numpy.array([[x, y, z] for z in (-0.5, 0.5) for y in (0.25, 1.25) for x in (-0.5, 0.5)], numpy.float32)
 BOX_TRIANGLES = numpy.array([[0, 2, 1], [1, 2, 3], [4, 5, 6], [5, 7, 6], [0, 1, 4], [1, 5, 4], [2, 6, 3], [3, 6, 7], [0, 4, 2],

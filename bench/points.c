@@ -1,14 +1,12 @@
-/* The C side of tests that compare values with Python, and of `tools/bench FILE.csv calls`, which compares
- * times. `points MODEL POINTS OUT` writes shadow, AO and distance at points as floats. POINTS holds float64
- * positions, then float32 normals, native. `points MODEL POINTS time ROUNDS` prints for each round the
+/* The C side of `tools/bench FILE.csv calls`. `points MODEL POINTS ROUNDS` prints for each round the
  * processor seconds of a call for all points. Then it prints the nanoseconds of a call for one point: of a
- * query, of a sample of a field, of vsh_shade_shadow(). */
+ * query, of a sample of a field, of vsh_shade_shadow(). POINTS holds float64 positions, then float32 normals,
+ * native. */
 #include <vdbshade/vdbshade.h>
 
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 
 enum { CALLS = 100000, POINT = 3 * sizeof(double) + 3 * sizeof(float) };
@@ -76,24 +74,8 @@ static void measure(const vsh_query *query, const vsh_occluders *occluders, cons
     free(shadow);
 }
 
-static void write_values(const vsh_query *query, const vsh_points *points, const char *path) {
-    float *values = allocate(3 * points->count * sizeof *values);
-    float *const planes[] = {values};
-    vsh_query_output output = vsh_query_output_default();
-    vsh_error error;
-    output.visibility = planes;
-    output.ao = values + points->count;
-    output.distance = values + 2 * points->count;
-    require(vsh_query_points(query, points, NULL, NULL, &output, NULL, &error) == VSH_OK, error.message);
-    FILE *file = fopen(path, "wb");
-    require(file != NULL && fwrite(values, 3 * sizeof *values, points->count, file) == points->count &&
-                fclose(file) == 0,
-            "cannot write the values");
-    free(values);
-}
-
 int main(int argc, char **argv) {
-    require(argc >= 4, "usage: points MODEL POINTS (OUT | time ROUNDS)");
+    require(argc == 4, "usage: points MODEL POINTS ROUNDS");
     vsh_error error;
     vsh_model *model = NULL;
     vsh_occluders *occluders = NULL;
@@ -119,13 +101,9 @@ int main(int argc, char **argv) {
     char *bytes = read_all(argv[2], &count);
     const vsh_points points = {count, (const double *)(const void *)bytes,
                                (const float *)(const void *)(bytes + count * 3 * sizeof(double)), NULL};
-    if (argc > 4 && strcmp(argv[3], "time") == 0) {
-        vsh_run run = vsh_run_default();
-        run.threads = 1;
-        measure(query, occluders, &points, &sun, &shade, &run, atoi(argv[4]));
-    } else {
-        write_values(query, &points, argv[3]);
-    }
+    vsh_run run = vsh_run_default();
+    run.threads = 1;
+    measure(query, occluders, &points, &sun, &shade, &run, atoi(argv[3]));
     vsh_query_free(query);
     vsh_occluders_free(occluders);
     vsh_model_free(model);
