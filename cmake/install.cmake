@@ -5,7 +5,9 @@ include(CMakePackageConfigHelpers)
 install(TARGETS vdbshade EXPORT vdbshade-targets
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT development
         INCLUDES DESTINATION ${CMAKE_INSTALL_INCLUDEDIR})
-install(TARGETS ${VSH_MODULES} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
+if(VSH_MODULES)
+  install(TARGETS ${VSH_MODULES} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/vdbshade COMPONENT library)
+endif()
 
 # The installed program has another relative path to the library than the build's, so it is linked again.
 cmake_path(IS_ABSOLUTE CMAKE_INSTALL_LIBDIR absolute)
@@ -33,9 +35,23 @@ install(DIRECTORY examples assets DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT 
 # dependencies by name, so the linker searches its usual folders.
 option(VSH_STATIC "Build the static library too" ON)
 if(VSH_STATIC AND NOT VSH_SANITIZE)
-  add_library(vdbshade_static STATIC $<TARGET_OBJECTS:vdbshade_objects> $<TARGET_OBJECTS:vdbshade_openvdb_objects>
-              $<TARGET_OBJECTS:vdbshade_importers_objects>)
+  add_library(vdbshade_static STATIC)
+  vsh_set_source_flags(vdbshade_static)
+  target_compile_definitions(vdbshade_static PRIVATE VSH_BUILD VSHI_SOVERSION="${VSH_SOVERSION}")
+  target_include_directories(vdbshade_static PRIVATE src include)
+  foreach(objects ${VSH_STATIC_PARTS})
+    target_sources(vdbshade_static PRIVATE $<TARGET_OBJECTS:${objects}>)
+  endforeach()
+  if(NOT VSH_OPENVDB)
+    target_sources(vdbshade_static PRIVATE ${VSH_OPENVDB_CALLS})
+  endif()
+  if(NOT VSH_ASSIMP)
+    target_sources(vdbshade_static PRIVATE ${VSH_IMPORTERS_CALLS})
+  endif()
   foreach(found openvdb half png assimp draco meshoptimizer jansson nettle sleef seccomp)
+    if(NOT VSH_${found}_LIBRARY) # left out
+      continue()
+    endif()
     cmake_path(GET VSH_${found}_LIBRARY FILENAME file)
     string(REGEX REPLACE "^lib(.*)\\.(so|a|dylib)$" "\\1" file ${file})
     list(APPEND VSH_STATIC_NEEDS ${file})

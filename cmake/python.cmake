@@ -1,19 +1,29 @@
 # The Python module: src/bindings/python/vdbshade and declarations that generate.py makes from the public headers and bindings.h.
 # PYTHONPATH=FOLDER/python uses it from a build folder.
 #
-# Uses the system's Python, which has Debian's numpy and cffi, not the first one in PATH.
-find_program(VSH_PYTHON_PROGRAM NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH DOC "Python with numpy and cffi")
+# Uses the system's Python, which has Debian's cffi and numpy, not the first one in PATH.
+find_program(VSH_PYTHON_PROGRAM NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH DOC "Python with cffi")
 find_program(VSH_PYTHON_PROGRAM NAMES python3)
-execute_process(COMMAND ${VSH_PYTHON_PROGRAM} -c "import sys, cffi, numpy; print(f'python{sys.version_info[0]}.{sys.version_info[1]}')"
+execute_process(COMMAND ${VSH_PYTHON_PROGRAM} -c "import sys, cffi; print(f'python{sys.version_info[0]}.{sys.version_info[1]}')"
                 OUTPUT_VARIABLE VSH_PYTHON_VERSION OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_VARIABLE missing RESULT_VARIABLE failed)
+set(wanted ON)
+if(failed AND NOT VSH_TESTS)
+  set(wanted OFF)
+endif()
+option(VSH_PYTHON "Build the Python module, and install it" ${wanted})
+if(NOT VSH_PYTHON)
+  message(STATUS "No Python module (VSH_PYTHON=OFF; it needs python3-cffi)")
+  return()
+endif()
 if(failed)
-  message(FATAL_ERROR "VSH_PYTHON: ${VSH_PYTHON_PROGRAM} has no numpy or no cffi (python3-numpy, python3-cffi): ${missing}")
+  message(FATAL_ERROR "VSH_PYTHON: ${VSH_PYTHON_PROGRAM} has no cffi (python3-cffi): ${missing}")
 endif()
 
 set(python ${PROJECT_SOURCE_DIR}/src/bindings/python)
 set(private ${PROJECT_SOURCE_DIR}/src/bindings/bindings.h)
 set(VSH_PYTHON_FOLDER ${PROJECT_BINARY_DIR}/python/vdbshade)
-file(GLOB sources CONFIGURE_DEPENDS RELATIVE ${python}/vdbshade ${python}/vdbshade/*.py ${python}/vdbshade/py.typed)
+file(GLOB sources CONFIGURE_DEPENDS RELATIVE ${python}/vdbshade ${python}/vdbshade/*.py ${python}/vdbshade/*.pyi
+     ${python}/vdbshade/py.typed)
 file(GLOB public CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/vdbshade/*.h)
 set(made ${VSH_PYTHON_FOLDER}/_abi.py ${VSH_PYTHON_FOLDER}/_version.py ${VSH_PYTHON_FOLDER}/types.py)
 add_custom_command(OUTPUT ${made}
