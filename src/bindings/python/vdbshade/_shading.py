@@ -8,11 +8,15 @@ import numpy
 from numpy.typing import ArrayLike
 
 from . import types
-from ._core import (array, ask, borrowed, call, constant, fail, ffi, Filled, Handle, keep, lib, OUT, output, pairs_of, Path,
+from ._core import (Array, array, ask, borrowed, call, constant, fail, ffi, Filled, Floats, Handle, keep, lib, OUT, output, pairs_of, Path,
                     path_of, pointer, record_of, Run, run_of, Several, split, Struct, struct_of, structs_of, text, texts_of,
                     Unpack, vector, words_of_bits)
 from ._casters import (attribute_structs, Attributes, attributes_of, dense, Field, Grid, Light, lights_of, Meshes, meshes_of, names_of,
                        Occluders)
+
+__all__ = ["Camera", "Charts", "Image", "Lightmap", "LitMeshes", "Picture", "Query", "Stats", "Volume", "Voxels",
+           "ao_method_traits", "bake_lightmap", "bake_volume", "image_check", "image_read", "image_write", "lightmap_fill_hidden",
+           "lightmaps_stitch", "render", "shade_ao", "shade_irradiance", "shade_shadow", "shadow_method_traits"]
 
 # --- points
 
@@ -27,7 +31,8 @@ class Stats(Struct):
 
     @property
     def told(self) -> types.ShadeStats:
-        return record_of(self.struct)
+        stats: types.ShadeStats = record_of(self.struct)
+        return stats
 
 
 def _points(positions: ArrayLike, normals: Optional[ArrayLike], texels: Optional[ArrayLike] = None) -> Tuple[Any, int]:
@@ -38,15 +43,15 @@ def _points(positions: ArrayLike, normals: Optional[ArrayLike], texels: Optional
     return keep(ffi.new("vsh_points *", [len(at)] + pointers), pointers), len(at)
 
 
-def _written(out: Optional[numpy.ndarray], shape: Tuple[int, ...], name: str) -> Optional[numpy.ndarray]:
+def _written(out: Optional[Floats], shape: Tuple[int, ...], name: str) -> Optional[Floats]:
     """An array to be written into, checked; None if none was given."""
     return None if out is None else output(out, numpy.float32, shape, name)
 
 
 def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[ArrayLike], light: Light, *,
-                 texels: Optional[ArrayLike] = None, out: Optional[numpy.ndarray] = None,
-                 error: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
-                 **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
+                 texels: Optional[ArrayLike] = None, out: Optional[Floats] = None,
+                 error: Optional[Floats] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
+                 **options: "Unpack[types.ShadeOptions]") -> Floats:
     """Fraction of a light that each point sees, 0 dark … 1 lit: before any cosine, colour or falloff.
 
     Parameters
@@ -75,9 +80,9 @@ def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[A
 
 
 def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, texels: Optional[ArrayLike] = None,
-             out: Optional[numpy.ndarray] = None, error: Optional[numpy.ndarray] = None,
-             bent: Optional[numpy.ndarray] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
-             **options: "Unpack[types.ShadeOptions]") -> numpy.ndarray:
+             out: Optional[Floats] = None, error: Optional[Floats] = None,
+             bent: Optional[Floats] = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
+             **options: "Unpack[types.ShadeOptions]") -> Floats:
     """Cosine-weighted fraction of the hemisphere that is free within ``ao_distance`` (world units), 0 … 1 open.
 
     Arguments as of shade_shadow(); `bent`, an array of float32 of shape (n, 3), receives bent normals: unit, world space.
@@ -89,13 +94,13 @@ def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, 
     return values
 
 
-def tint_of(tint: "str | dict | types.Tint") -> Filled:
+def tint_of(tint: "types.TintType | types.Tint") -> Filled:
     """``vsh_tint`` of "quadratic" or dict(type="power", power=(r, g, b))."""
     return Filled("vsh_tint", dict(type=tint) if isinstance(tint, str) else tint)
 
 
 def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, visibility: ArrayLike,
-                     out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+                     out: Optional[Floats] = None) -> Floats:
     """Irradiance of one light, linear RGB, added to `out`, an array of float32 of shape (n, 3) (None: to zeros):
     visibility × colour × falloff × cosine."""
     points, count = _points(positions, numpy.asarray(normals))
@@ -107,7 +112,7 @@ def shade_irradiance(positions: ArrayLike, normals: ArrayLike, light: Light, vis
 
 
 _SMALL = 64  # points that vsh_query_points() shades on the calling thread, without progress
-_FLOAT32: numpy.dtype = numpy.dtype(numpy.float32)
+_FLOAT32 = numpy.dtype(numpy.float32)
 
 
 class Query(Handle, kind="vsh_query"):
@@ -131,8 +136,8 @@ class Query(Handle, kind="vsh_query"):
 
     def points(self, positions: ArrayLike, normals: Optional[ArrayLike] = None, *, shadow: bool = True, ao: bool = False,
                error: bool = False, distance: bool = False, gradient: bool = False, texels: Optional[ArrayLike] = None,
-               out: Optional[Dict[str, numpy.ndarray]] = None, stats: Optional[Stats] = None,
-               run: Optional[Run] = None) -> Dict[str, numpy.ndarray]:
+               out: Optional[Dict[str, Floats]] = None, stats: Optional[Stats] = None,
+               run: Optional[Run] = None) -> Dict[str, Floats]:
         """Shades points.
 
         Parameters
@@ -179,7 +184,7 @@ class Query(Handle, kind="vsh_query"):
         del keeps
         return out
 
-    def _check(self, out: Dict[str, numpy.ndarray], shapes: Mapping[str, Tuple[int, ...]]) -> None:
+    def _check(self, out: Dict[str, Floats], shapes: Mapping[str, Tuple[int, ...]]) -> None:
         for name, values in out.items():
             if name not in shapes:
                 raise ValueError(f"out: no value {name!r}; there are {', '.join(shapes)}")
@@ -187,7 +192,7 @@ class Query(Handle, kind="vsh_query"):
                 raise TypeError(f"out[{name!r}]: expected an array")
             output(values, _FLOAT32, shapes[name], f"out[{name!r}]")
 
-    def _output(self, out: Dict[str, numpy.ndarray], count: int) -> Tuple[Any, Any]:
+    def _output(self, out: Dict[str, Floats], count: int) -> Tuple[Any, Any]:
         values = ffi.new("vsh_query_output *")
         values.struct_size = _OUTPUT_SIZE
         keeps = []
@@ -206,12 +211,12 @@ class Query(Handle, kind="vsh_query"):
 _OUTPUT_SIZE = ffi.sizeof("vsh_query_output")
 
 
-def shadow_method_traits(method: str) -> List[str]:
+def shadow_method_traits(method: types.ShadowMethod) -> List[str]:
     """The traits of a shadow method: "rays", "keeps_error", "triangles", "inner"."""
     return words_of_bits("vsh_method_trait", lib.vsh_method_traits(lib.VSH_NAMES_SHADOW, constant("vsh_shadow_method", method, "method")))
 
 
-def ao_method_traits(method: str) -> List[str]:
+def ao_method_traits(method: types.AoMethod) -> List[str]:
     """The traits of an AO method, as of shadow_method_traits()."""
     return words_of_bits("vsh_method_trait", lib.vsh_method_traits(lib.VSH_NAMES_AO, constant("vsh_ao_method", method, "method")))
 
@@ -220,12 +225,13 @@ def ao_method_traits(method: str) -> List[str]:
 
 
 _AXES = {"irradiance": "RGB", "tint": "RGB", "bent": "XYZ"}
-_HOLDS = {"irradiance": "light", "tint": "light", "bent": "vector"}
+_HOLDS: Dict[str, types.ChannelKind] = {"irradiance": "light", "tint": "light", "bent": "vector"}
 
 
-def _flat(channels: Mapping[str, ArrayLike]) -> "Tuple[Dict[str, numpy.ndarray], Dict[str, str]]":
+def _flat(channels: Mapping[str, ArrayLike]) -> Tuple[Dict[str, Array], Dict[str, types.ChannelKind]]:
     """Splits planes (height, width, 3) into channels, named as in files; and what channels hold."""
-    planes, holds = {}, {}
+    planes: Dict[str, Array] = {}
+    holds: Dict[str, types.ChannelKind] = {}
     for name, values in channels.items():
         found = numpy.asarray(values)
         kind = name.split(".")[0]
@@ -239,14 +245,14 @@ def _flat(channels: Mapping[str, ArrayLike]) -> "Tuple[Dict[str, numpy.ndarray],
     return planes, holds
 
 
-def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, str]] = None) -> Filled:
+def _named(names: Sequence[str], shape: Tuple[int, int], holds: Optional[Mapping[str, types.ChannelKind]] = None) -> Filled:
     """``vsh_image`` of channels' names, without planes."""
     kinds = [constant("vsh_channel_kind", (holds or {}).get(n, _HOLDS.get(n.split(".")[0], "data")), "holds") for n in names]
     return Filled("vsh_image", width=shape[1], height=shape[0], channel_count=len(names), names=texts_of(list(names), "names"),
                   holds=ffi.new("vsh_channel_kind[]", kinds or 1))
 
 
-def image_of(channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, str]] = None) -> Filled:
+def image_of(channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, types.ChannelKind]] = None) -> Filled:
     """``vsh_image`` of channels by their names."""
     planes, kinds = _flat(channels)
     kinds.update(holds or {})
@@ -261,7 +267,7 @@ def image_of(channels: Mapping[str, ArrayLike], holds: Optional[Mapping[str, str
     return image
 
 
-class Image(dict):
+class Image(Dict[str, Floats]):
     """Planes of an image file by their names: arrays of float32 of shape (height, width), row 0 on top, views.
 
     Attributes
@@ -279,7 +285,7 @@ def image_read(path: Path, *, run: Optional[Run] = None) -> Image:
     view = lib.vsh_image_view(file)
     image = Image()
     for i in range(view.channel_count):
-        image[text(view.names[i])] = borrowed(view.planes[i], (view.height, view.width), numpy.float32, file)
+        image[text(view.names[i]) or ""] = borrowed(view.planes[i], (view.height, view.width), numpy.float32, file)
     count = ffi.new("size_t *")
     attributes = lib.vsh_image_attributes(file, count)
     image.attributes = pairs_of(attributes, count[0])
@@ -290,7 +296,7 @@ def _options(options: Any, attributes: Optional[Attributes]) -> Filled:
     return Filled("vsh_image_options", options, attributes=attributes_of(attributes))
 
 
-def image_write(path: Path, channels: Mapping[str, ArrayLike], *, holds: Optional[Mapping[str, str]] = None,
+def image_write(path: Path, channels: Mapping[str, ArrayLike], *, holds: Optional[Mapping[str, types.ChannelKind]] = None,
                 attributes: Optional[Attributes] = None, **options: "Unpack[types.ImageOptions]") -> None:
     """Writes an image, whole or not at all; the path's ending is the format (docs/formats.md).
 
@@ -318,7 +324,7 @@ def image_check(path: Path, names: Sequence[str], shape: Tuple[int, int], *,
 # --- lightmaps and volumes
 
 
-def _lightmap_options(options: Dict[str, Any]) -> Filled:
+def _lightmap_options(options: Mapping[str, Any]) -> Filled:
     own, shade = split(options, "vsh_lightmap_options", "vsh_shade_options")
     return Filled("vsh_lightmap_options", dict(own, shade=shade))
 
@@ -346,7 +352,7 @@ class Charts(Handle, kind="vsh_charts"):
 
     info: types.ChartsInfo
 
-    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: Any) -> None:
+    def __init__(self, meshes: Meshes, *, run: Optional[Run] = None, **options: "Unpack[types.ChartsKeywords]") -> None:
         structs, count = meshes_of(meshes)
         reports, charts = call(lib.vsh_charts_create, structs, count, _lightmap_options(options), Several(count), OUT, run=run, keeps=structs)
         self._begin(charts, count)
@@ -359,7 +365,7 @@ class Charts(Handle, kind="vsh_charts"):
         self.mesh_count = mesh_count
 
 
-class Planes(Dict[str, numpy.ndarray]):
+class Planes(Dict[str, Floats]):
     """Planes of an image by their channels' names."""
 
     def write(self, path: Path, **options: Any) -> None:
@@ -389,9 +395,9 @@ class Lightmap(Planes):
 class _Planes(Struct):
     """``vsh_lightmap`` and the arrays that it points to."""
 
-    def __init__(self, shape: Tuple[int, int], names: Sequence[str], out: Optional[Mapping[str, numpy.ndarray]], *, ao: bool = False,
-                 irradiance: bool = False, bent: Optional[str] = None, sky: Optional[str] = None, error: bool = False,
-                 invalid: bool = False, tint: Any = None, ambient: Any = None) -> None:
+    def __init__(self, shape: Tuple[int, int], names: Sequence[str], out: Optional[Mapping[str, Floats]], *, ao: bool = False,
+                 irradiance: bool = False, bent: Optional[types.BentSpace] = None, sky: Optional[types.Up] = None, error: bool = False,
+                 invalid: bool = False, tint: "types.TintType | types.Tint | None" = None, ambient: Any = None) -> None:
         wanted: Dict[str, Tuple[int, ...]] = {}
         threes = (*shape, 3)
         wanted.update({f"shadow.{n}": shape for n in names})
@@ -432,9 +438,9 @@ def _error_of(error: Any) -> Tuple[float, float]:
 
 
 def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Sequence[Light]] = (), *, ao: bool = False,
-                  irradiance: bool = False, bent: Optional[str] = None, sky: Optional[str] = None, error: bool = False,
-                  invalid: bool = False, tint: "str | types.Tint | None" = None, ambient: Optional[Sequence[float]] = None,
-                  out: Optional[Mapping[str, numpy.ndarray]] = None, run: Optional[Run] = None,
+                  irradiance: bool = False, bent: Optional[types.BentSpace] = None, sky: Optional[types.Up] = None, error: bool = False,
+                  invalid: bool = False, tint: "types.TintType | types.Tint | None" = None, ambient: Optional[Sequence[float]] = None,
+                  out: Optional[Mapping[str, Floats]] = None, run: Optional[Run] = None,
                   **options: "Unpack[types.ShadeOptions]") -> Lightmap:
     """Shades the texels of charts into planes: "shadow.NAME" of each light, "A" (1 where a texel is valid), and those of the options.
 
@@ -486,11 +492,11 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
     return lightmap
 
 
-def _shadows(lightmap: Mapping[str, numpy.ndarray]) -> List[str]:
+def _shadows(lightmap: Mapping[str, Floats]) -> List[str]:
     return [n[len("shadow.") :] for n in lightmap if n.startswith("shadow.")]
 
 
-def _given(shape: Tuple[int, int], names: List[str], lightmap: Mapping[str, numpy.ndarray], bent: Optional[str] = None) -> _Planes:
+def _given(shape: Tuple[int, int], names: List[str], lightmap: Mapping[str, Floats], bent: Optional[types.BentSpace] = None) -> _Planes:
     """The planes of a lightmap whose values are moved; those of `names` in their order."""
     given = {n: p for n, p in lightmap.items() if n.split(".")[0] in ("shadow", "tint", "ao", "irradiance", "sky", "A")}
     if bent is not None:
@@ -502,7 +508,7 @@ def _given(shape: Tuple[int, int], names: List[str], lightmap: Mapping[str, nump
                    sky="y" if "sky" in given else None, tint="quadratic" if tinted else None)
 
 
-def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]], *, run: Optional[Run] = None,
+def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, Floats]]], *, run: Optional[Run] = None,
                      **options: "Unpack[types.StitchOptions]") -> types.StitchReport:
     """Makes the values on both sides of charts' borders agree, within and between lightmaps of any sizes, such as pages of one atlas.
 
@@ -519,10 +525,11 @@ def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, numpy.ndarray]]]
         if set(lightmap) != set(pages[0][1]):
             raise ValueError(f"pages: number {i} has planes {', '.join(sorted(lightmap))}, the first {', '.join(sorted(pages[0][1]))}")
     structs = structs_of("vsh_stitch_page", [dict(charts=_handle(c), lightmap=_given(c.shape, names, lightmap)) for c, lightmap in pages])
-    return call(lib.vsh_lightmaps_stitch, structs, len(pages), len(names), Filled("vsh_stitch_options", options), OUT, run=run)
+    report: types.StitchReport = call(lib.vsh_lightmaps_stitch, structs, len(pages), len(names), Filled("vsh_stitch_options", options), OUT, run=run)
+    return report
 
 
-def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], *, bent: Optional[str] = None,
+def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, Floats], *, bent: Optional[types.BentSpace] = None,
                          run: Optional[Run] = None) -> int:
     """Gives texels that are not valid and that no valid one of their chart filled, as those of faces that touch each other, the
     values of the texel that is nearest in the world, and pads around them. The lightmap's arrays are written into.
@@ -540,7 +547,7 @@ def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, numpy.ndarray], 
         how many texels were filled
     """
     names = _shadows(lightmap)
-    return call(lib.vsh_lightmap_fill_hidden, _handle(charts), _given(charts.shape, names, lightmap, bent), len(names), OUT, run=run)
+    return int(call(lib.vsh_lightmap_fill_hidden, _handle(charts), _given(charts.shape, names, lightmap, bent), len(names), OUT, run=run))
 
 
 class Voxels(Handle, kind="vsh_voxels"):
@@ -586,7 +593,7 @@ class Volume(Handle, kind="vsh_volume"):
         return names.index(grid)
 
     def values(self, grid: Union[int, str], index_min: Sequence[int], shape: Sequence[int],
-               out: Optional[numpy.ndarray] = None) -> numpy.ndarray:
+               out: Optional[Floats] = None) -> Floats:
         """A dense copy: float32 of shape (depth, height, width) from voxel `index_min` (x, y, z) on; 1 where not active."""
         number = self._number(grid)
         return dense(None, index_min, shape, out, lambda *box: call(lib.vsh_volume_copy, self, number, *box))
@@ -597,7 +604,7 @@ class Volume(Handle, kind="vsh_volume"):
 
 
 def bake_volume(occluders: Occluders, voxels: Voxels, lights: Union[Light, Sequence[Light]] = (), *, stats: Optional[Stats] = None,
-                run: Optional[Run] = None, **options: Any) -> Volume:
+                run: Optional[Run] = None, **options: "Unpack[types.VolumeKeywords]") -> Volume:
     """Shades voxels.
 
     Parameters
@@ -669,11 +676,11 @@ class LitMeshes(Struct, kind="vsh_lit_meshes"):
                              lightmap=None if lightmap is None else image_of(lightmap)).struct
 
 
-class Picture(Dict[str, numpy.ndarray]):
+class Picture(Dict[str, Floats]):
     """Planes of float32, row 0 on top: "color" (height, width, 3) linear RGB, "alpha", "depth" (height, width), "normal"
     (height, width, 3)."""
 
-    def encode(self, exposure: float = 0.0, alpha: bool = False) -> numpy.ndarray:
+    def encode(self, exposure: float = 0.0, alpha: bool = False) -> Floats:
         """For files of 8 bits: float32 of shape (height, width, 3 or 4), 0 … 1, through the sRGB curve."""
         height, width = self["alpha"].shape
         planes = [numpy.empty((height, width), numpy.float32) for _ in range(4 if alpha else 3)]
@@ -684,7 +691,8 @@ class Picture(Dict[str, numpy.ndarray]):
 
 def render(surfaces: "Sequence[Union[Field, Tuple[Field, Sequence[float]]]]", occluders: Occluders,
            lights: Union[Light, Sequence[Light]] = (), *, camera: Optional[Camera] = None, lit: Sequence[LitMeshes] = (),
-           tint: Any = None, stats: Optional[Stats] = None, run: Optional[Run] = None, **options: Any) -> Picture:
+           tint: "types.TintType | types.Tint | None" = None, stats: Optional[Stats] = None, run: Optional[Run] = None,
+           **options: "Unpack[types.RenderKeywords]") -> Picture:
     """Renders a picture.
 
     Parameters
