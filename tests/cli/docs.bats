@@ -83,7 +83,7 @@ made() {
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
 options_of() {
     grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
-        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test|exclude-libs)' # of CMake, pkg-config, git, tools/…
+        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test|exclude-libs|system-site-packages)' # of CMake, pkg-config, git, Python, tools/…
 }
 
 @test "the documents name every option of --help, and no other" {
