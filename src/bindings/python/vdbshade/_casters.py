@@ -259,7 +259,7 @@ def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.So
 
 
 class Model(Handle, kind="vsh_model"):
-    """A file of meshes: OBJ, glTF, GLB, PLY, STL, FBX, Collada (docs/meshes.md). A sequence of its meshes, as views.
+    """A file of meshes: OBJ, glTF, GLB, PLY, STL, FBX, Collada (docs/formats.md). A sequence of its meshes, as views.
 
     Parameters
     ----------
