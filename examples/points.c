@@ -1,29 +1,40 @@
-/* The sun at points: below a ball, and beside it. */
+/* How much of the sun reaches points of a level, say of characters: points LEVEL.glb <FILE, with X Y Z in
+ * each line */
 #include <stdio.h>
+#include <stdlib.h>
 #include <vdbshade/vdbshade.h>
 
-int main(void) {
-    vsh_sdf_node ball = vsh_sdf_node_default(); /* a unit sphere at the origin */
-    vsh_sdf tree = {&ball, 1};
-    vsh_grid_options voxels = vsh_grid_options_default();
-    voxels.voxel_size = 0.05;
+int main(int argc, char **argv) {
+    vsh_run run = vsh_run_default();
+    run.reader = VSH_READER; /* models are parsed in a process of their own */
     vsh_error error;
-    vsh_grid *grid;
+    vsh_model *level = NULL;
     vsh_occluders *occluders = NULL;
-    if (vsh_grid_from_sdf(&tree, &voxels, NULL, &grid, &error) != VSH_OK ||
-        vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error) != VSH_OK) {
-        fprintf(stderr, "points: %s\n", error.message);
-        return 1;
+    vsh_result result = vsh_model_read(argc > 1 ? argv[1] : "level.glb", &run, &level, &error);
+    if (result == VSH_OK) {
+        const size_t count = vsh_model_mesh_count(level);
+        vsh_mesh *meshes = calloc(count, sizeof *meshes);
+        for (size_t i = 0; meshes != NULL && i < count; ++i) {
+            meshes[i] = vsh_model_mesh(level, i, -1);
+        }
+        result = vsh_occluders_create(meshes, count, NULL, &run, &occluders, &error);
+        free(meshes);
     }
-    const double positions[2][3] = {{0.0, -2.0, 0.0}, {3.0, -2.0, 0.0}};
-    const float normals[2][3] = {{0.0f, 1.0f, 0.0f}, {0.0f, 1.0f, 0.0f}};
-    const vsh_points points = {2, &positions[0][0], &normals[0][0], NULL};
-    const vsh_light sun = vsh_light_default(); /* half a degree, straight overhead */
-    float lit[2];
-    if (vsh_shade_shadow(occluders, &points, &sun, NULL, NULL, lit, NULL, NULL, &error) == VSH_OK) {
-        printf("%g %g\n", (double)lit[0], (double)lit[1]); /* 0 1 */
+    vsh_light sun = vsh_light_default();
+    sun.direction[0] = -0.5; /* towards it; y is 1 */
+    sun.direction[2] = 0.7;
+    sun.angle = 0.035; /* two degrees */
+    double position[3];
+    const vsh_points point = {1, position, NULL, NULL};
+    while (result == VSH_OK && scanf("%lf %lf %lf", &position[0], &position[1], &position[2]) == 3) {
+        float lit = 0;
+        result = vsh_shade_shadow(occluders, &point, &sun, NULL, &run, &lit, NULL, NULL, &error);
+        printf("%g\n", (double)lit);
+    }
+    if (result != VSH_OK) {
+        fprintf(stderr, "points: %s\n", error.message);
     }
     vsh_occluders_free(occluders);
-    vsh_grid_free(grid);
-    return 0;
+    vsh_model_free(level);
+    return result != VSH_OK;
 }

@@ -348,3 +348,14 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     pixel_is 350 100 $(plain 160 170 180 1 1 1 "$(over_pi '200 / 255')")
     pixel_is 50 300 $(plain 200 210 220 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 30 / 255) / 2')")
 }
+
+@test "docs/tutorial.md leads from Blender to a lit page, and to shadows in a C program" {
+    command -v blender >/dev/null || skip "there is no Blender"
+    cmake --install "$(dirname "$VDBSHADE")" --prefix "$PWD/opt" >/dev/null
+    sed "s|/opt/vdbshade|$PWD/opt|" "$DOCS/tutorial.md" >tutorial.md
+    blocks_of python tutorial.md >court.py
+    DOCS=. VDBSHADE=opt/bin/vdbshade run_commands tutorial.md 6
+    [[ $(xargs <out.txt) == 0\ 0.[4-6]*\ 1 && -s game/lit.lightmap.png ]] || fail "$(cat out.txt)"
+    WIDE=640x400 look lit.html "ui=0&camera=4.5,3.4,6,-0.6,0.6,0&fov=40"
+    [ "$(picture get page.png 265 190 | cut -d' ' -f1)" -gt 120 ] || fail "the crate is dark"
+}

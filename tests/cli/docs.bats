@@ -1,8 +1,6 @@
 # Every scene in docs/scene.md and docs/flat.md bakes, and every command in README.md, docs/query.md, docs/view.md, docs/lit.md and
-# docs/pipeline.md runs (blocks of sh; those of bash need a farm).
+# docs/pipeline.md runs (blocks of sh; those of bash need a farm). Those of docs/tutorial.md run in browser.bats.
 load helper
-
-README=$BATS_TEST_DIRNAME/../../README.md
 
 prepare() {
     ln -s "$(cd "$ASSETS" && pwd)" assets
@@ -14,18 +12,6 @@ scenes_of() {
     awk -v name="$2" '/^```json$/ { file = sprintf("%s%02d.json", name, ++n); inside = 1; next }
         /^```$/ { inside = 0 }
         inside { print > file }' "$DOCS/$1"
-}
-
-# run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least. Lines that a backslash ends are continued.
-run_commands() {
-    mkdir -p bin
-    ln -sf "$(realpath "$VDBSHADE")" bin/vdbshade
-    awk '/^ *```sh$/ { inside = 1; next } /^ *```$/ { inside = 0 } inside' "$DOCS/$1" |
-        sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | sed 's/^ *//' | grep -E "${ONLY:-.}" >commands
-    [ "$(grep -c vdbshade commands)" -ge "$2" ]
-    while read -r command; do
-        PATH=$PWD/bin:$PATH bash -c "set -o pipefail; $command" >/dev/null 2>err.txt || fail "$command: $(cat err.txt)"
-    done <commands
 }
 
 @test "every scene of docs/scene.md and docs/flat.md bakes, or voxelizes where it has no receivers" {
@@ -65,9 +51,7 @@ run_commands() {
 
 # made FILE …
 made() {
-    for file; do
-        [ -s "$file" ] || fail "no $file"
-    done
+    empty=$(find "$@" -empty) && [ -z "$empty" ] || fail "not all of $*"
 }
 
 @test "every command of the README and of docs/lit.md, docs/pipeline.md and docs/view.md" {
@@ -83,7 +67,7 @@ made() {
 # options_of FILE …: each option that is named there, once. Those of other programs are left out.
 options_of() {
     grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
-        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test|exclude-libs|system-site-packages)' # of CMake, pkg-config, git, Python, tools/…
+        grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test|exclude-libs|system-site-packages|python)' # of CMake, pkg-config, git, Python, Blender, tools/…
 }
 
 @test "the documents name every option of --help, and no other" {
@@ -108,15 +92,10 @@ options_of() {
     [ ! -s unknown.txt ] || fail "not in a header: $(cat unknown.txt)"
 }
 
-# block N FILE: the Nth block of C of a Markdown file.
-block() {
-    awk -v wanted="$1" '/^```c$/ { inside = ++n == wanted; next } /^```$/ { inside = 0 } inside' "$2"
-}
-
 @test "the C of the README, and of the header that includes all, is that of examples/lightmap.c" {
     local examples=$BATS_TEST_DIRNAME/../../examples header=$BATS_TEST_DIRNAME/../../include/vdbshade/vdbshade.h
     bake=$(sed -n '/^static vsh_result bake(/,/^}/p' "$examples/lightmap.c")
-    [ "$(block 1 "$README" | tail -n +2)" = "$bake" ] || fail "lightmap.c"
+    [ "$(blocks_of c "$DOCS/../README.md" | tail -n +2)" = "$bake" ] || fail "lightmap.c"
     [ "$(sed -nE '/^ \*     static vsh_result bake/,/^ \*     }/s/^ \*     ?//p' "$header" | sed 's|// \(.*\)|/* \1 */|')" = "$bake" ] ||
         fail "vdbshade.h"
 }

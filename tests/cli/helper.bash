@@ -287,3 +287,19 @@ write_packed() {
  "textures": [{"source": 0}], "images": [{"uri": "none.png"}], "extensionsUsed": ["KHR_mesh_quantization", "KHR_texture_transform"]}
 JSON
 }
+
+# blocks_of KIND FILE: prints the code blocks of a Markdown file that are of this kind.
+blocks_of() {
+    awk -v begin="\`\`\`$1" '$1 == begin { inside = 1; next } $1 == "```" { inside = 0 } inside' "$2"
+}
+
+# run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least. Lines that a backslash ends are continued. The last
+# command's output is in out.txt.
+run_commands() {
+    blocks_of sh "$DOCS/$1" | sed -e ':a' -e '/\\$/N; s/\\\n//; ta' | sed 's/^ *//' | grep -E "${ONLY:-.}" >commands
+    [ "$(grep -c vdbshade commands)" -ge "$2" ]
+    while read -r command; do
+        PATH=$(dirname "$(realpath "$VDBSHADE")"):$PATH bash -c "set -o pipefail; $command" >out.txt 2>err.txt </dev/null ||
+            fail "$command: $(cat err.txt)"
+    done <commands
+}
