@@ -759,6 +759,13 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_pack_item *items, size_t count,
         VSHI_TRY_DONE(attempt(&s, asked, &over, error));
         if (over > 1.0) {
             VSHI_TRY_DONE(find_density(&s, 1, error));
+            if (isinf(over)) {
+                result = vshi_fail(
+                    error, VSH_ERROR_LIMIT,
+                    "a chart is larger than a page of %d × %d texels at %g texels a unit: %.4g would fit",
+                    packing->width, packing->height, asked, s.best_density);
+                goto done;
+            }
             result = vshi_fail(
                 error, VSH_ERROR_LIMIT,
                 "charts do not fit into %u page%s of %d × %d texels at %g texels a unit: %.4g would fit",

@@ -168,7 +168,7 @@ LIST
     write_scene fit.json two.obj '' '"max_size": 64, "unwrap": "always"'
     refuses 2 max_size texels_per_unit -- bake fit.json --resolution 24 -o x.exr
     refuses 2 pages -- bake two.obj "${SMALL[@]}" --per-object --pages 2 --unwrap always -o x.exr
-    refuses 4 two.obj "'box'" "would fit" -- bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
+    refuses 4 two.obj "'box'" "a chart is larger than a page of 16 × 16 texels" -- bake two.obj "${SMALL[@]}" --size 16 --texels-per-unit 40 --per-object --unwrap always -o x.exr
 }
 
 # scattered COUNT: triangles that share no edges, so each is a chart.
