@@ -8,11 +8,51 @@
 #include <errno.h>
 #include <pthread.h>
 #include <stdarg.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 vsh_error cli_error;
 vsh_run cli_run;
 char cli_last_line[CLI_LINE];
+
+/* --- the terminal */
+
+/* Replaces control characters of ASCII and of UTF-8, but not newlines, by '?'. */
+static void make_plain(char *text, size_t size) {
+    unsigned char before = 0;
+    for (size_t i = 0; i < size; ++i) {
+        const unsigned char c = (unsigned char)text[i];
+        if ((c < 0x20 && c != '\n') || c == 0x7f || (before == 0xc2 && c >= 0x80 && c < 0xa0)) {
+            text[i] = '?';
+            if (c >= 0x80) {
+                text[i - 1] = '?';
+            }
+        }
+        before = c;
+    }
+}
+
+/* Whether standard error is a terminal that knows escape sequences. */
+static bool has_escapes(void) {
+    const char *term = getenv("TERM");
+    return isatty(STDERR_FILENO) != 0 && term != NULL && strcmp(term, "dumb") != 0;
+}
+
+/* Returns the escape sequence if it may be used (https://no-color.org), else "". */
+static const char *use_color(const char *sequence) {
+    const char *no_color = getenv("NO_COLOR");
+    return has_escapes() && (no_color == NULL || no_color[0] == '\0') ? sequence : "";
+}
+
+/* Returns the smaller of the terminal's width and COLUMNS; 80 if neither is known. */
+static int find_columns(void) {
+    struct winsize window = {.ws_col = 0};
+    const char *text = getenv("COLUMNS");
+    const long given = text != NULL ? strtol(text, NULL, 10) : 0;
+    ioctl(STDERR_FILENO, TIOCGWINSZ, &window);
+    const int columns = window.ws_col > 0 ? window.ws_col : 80;
+    return given > 0 && (given < columns || window.ws_col == 0) ? (int)given : columns;
+}
 
 /* --- progress */
 
@@ -22,7 +62,7 @@ static const double log_interval = 2.0;
 
 /* The time left is shown after this much of a stage. */
 static const double estimate_fraction = 0.02;
-static const double estimate_seconds = 0.5;
+static const double estimate_seconds = 1.0;
 
 enum { NAME = 32 };
 
@@ -38,7 +78,7 @@ static struct {
 } progress = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 void cli_begin_progress(bool shown) {
-    progress.terminal = isatty(STDERR_FILENO) != 0;
+    progress.terminal = has_escapes();
     progress.shown = shown && (cli_given.progress || progress.terminal);
     progress.stage[0] = '\0';
 }
@@ -50,17 +90,26 @@ static void clear_line(void) {
     }
 }
 
+/* Writes a line, on a terminal one that is shorter than it is wide, with a bar if there is room. */
 static void show_progress(double fraction, double now) {
-    char rest[32] = "";
+    static const char full[] = "########################################";
+    enum { WIDEST = sizeof full - 1, LEAST = 8, REST = 46 /* columns of the other text */ };
+    char rest[32] = "", line[512];
     const double elapsed = now - progress.began, done = fraction - progress.skipped;
     if (elapsed >= estimate_seconds && done >= estimate_fraction && fraction < 1.0) {
-        const double left = elapsed * (1.0 - fraction) / done;
+        const double left = fmax(elapsed * (1.0 - fraction) / done, progress.terminal ? 1.0 : 0.0);
         snprintf(rest, sizeof rest, ", about %.0f %s left", left >= 100.0 ? left / 60.0 : left,
                  left >= 100.0 ? "min" : "s");
     }
+    const int columns = progress.terminal ? find_columns() - 1 : (int)sizeof line;
+    const int room = !progress.terminal || columns < REST + LEAST ? 0
+                     : columns < REST + WIDEST                    ? columns - REST
+                                                                  : WIDEST;
+    const int drawn = (int)(room * fmin(fmax(fraction, 0.0), 1.0));
+    snprintf(line, sizeof line, "vdbshade: %s%.*s%*s%s%s %.0f %%%s", room > 0 ? "[" : "", drawn, full,
+             room - drawn, "", room > 0 ? "] " : "", progress.stage, 100.0 * fraction, rest);
     clear_line();
-    fprintf(stderr, "vdbshade: %s %.0f %%%s%s", progress.stage, 100.0 * fraction, rest,
-            progress.terminal ? "" : "\n");
+    fprintf(stderr, "%.*s%s", columns, line, progress.terminal ? "" : "\n");
     fflush(stderr);
     progress.standing = progress.terminal;
     progress.last = now;
@@ -74,6 +123,7 @@ int32_t cli_report_progress(void *user, const char *name, double fraction) {
         const bool is_new = strncmp(progress.stage, name, NAME - 1) != 0;
         if (is_new) {
             snprintf(progress.stage, NAME, "%s", name);
+            make_plain(progress.stage, strlen(progress.stage));
             progress.began = now;
             progress.skipped = fraction;
         }
@@ -99,22 +149,8 @@ int cli_begin_writing(void) {
 
 /* --- messages */
 
-/* Replaces control characters of ASCII and of UTF-8, but not newlines, by '?'. */
-static void make_plain(char *text, size_t size) {
-    unsigned char before = 0;
-    for (size_t i = 0; i < size; ++i) {
-        const unsigned char c = (unsigned char)text[i];
-        if ((c < 0x20 && c != '\n') || c == 0x7f || (before == 0xc2 && c >= 0x80 && c < 0xa0)) {
-            text[i] = '?';
-            if (c >= 0x80) {
-                text[i - 1] = '?';
-            }
-        }
-        before = c;
-    }
-}
-
-static void __attribute__((format(printf, 1, 0))) say(const char *format, va_list arguments) {
+static void __attribute__((format(printf, 2, 0)))
+say(const char *color, const char *format, va_list arguments) {
     char line[3 * 4096]; /* two paths and a text */
     vsnprintf(line, sizeof line, format, arguments);
     vshi_one_line(line);
@@ -122,14 +158,15 @@ static void __attribute__((format(printf, 1, 0))) say(const char *format, va_lis
     snprintf(cli_last_line, sizeof cli_last_line, "%s", line);
     pthread_mutex_lock(&progress.lock);
     clear_line();
-    fprintf(stderr, "vdbshade: %s\n", line);
+    fprintf(stderr, "%svdbshade: %s%s\n", color, line, color[0] != '\0' ? "\033[0m" : "");
     pthread_mutex_unlock(&progress.lock);
 }
 
 void cli_say(const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
-    say(format, arguments);
+    say(strncmp(format, "warning: ", strlen("warning: ")) == 0 ? use_color("\033[33m") : "", format,
+        arguments);
     va_end(arguments);
 }
 
@@ -137,7 +174,7 @@ int cli_refuse(int code, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
     cli_print_warnings();
-    say(format, arguments);
+    say(use_color("\033[31m"), format, arguments);
     va_end(arguments);
     return code;
 }
@@ -300,7 +337,7 @@ static void add_warning(void *user, const char *message) {
     const bool kept = !cli_given.verbose && keep(message);
     pthread_mutex_unlock(&warnings.lock);
     if (!kept) { /* notes begin with "note: " */
-        cli_say("%s%s", strncmp(message, "note: ", 6) == 0 ? "" : "warning: ", message);
+        cli_say(strncmp(message, "note: ", 6) == 0 ? "%s" : "warning: %s", message);
     }
 }
 

@@ -75,6 +75,24 @@ LIST
     done
 }
 
+# terminal COLUMNS ARG …: what the program writes to a terminal of that width, a line for each time it begins one.
+terminal() {
+    script -qec "stty cols $1; exec $(printf '%q ' "$VDBSHADE" "${@:2}")" /dev/null | tr '\r' '\n'
+}
+
+@test "a terminal shows a bar with percent and time left that fits, and colours unless NO_COLOR or TERM=dumb" {
+    local red=$'\033[31mvdbshade: ' columns
+    export TERM=xterm
+    for columns in 100 30; do
+        terminal $columns bake "$ASSETS/cloister.glb" --ao 0.6 --max-error 0.005 --size 512 -o out.exr | sed -n 's/^\x1b\[K//; / %/p' >$columns
+        awk -v columns=$columns 'length >= columns || /left/ && !begun { exit 1 } { begun = 1 }' $columns || fail "$(cat $columns)"
+    done
+    grep -qE '^vdbshade: \[##* *\] bake [0-9]+ %, about [0-9]+ s left$' 100 || fail "$(cat 100)"
+    grep -q '^vdbshade: bake [0-9]* %, about' 30 || fail "$(cat 30)"
+    [[ $(terminal 100 info none.obj) == "$red"* && $(NO_COLOR=1 terminal 100 info none.obj) == vdbshade* ]] || fail "colours"
+    [[ $(TERM=dumb terminal 100 bake box.obj "${SMALL[@]}" -o out.exr) != *[%$'\033']* ]] || fail "a dumb terminal"
+}
+
 @test "an open mesh, overlapping charts and UVs outside the square are reported with the mesh's name" {
     sed -e '$d' -e 's/^vt 0.35 0.02/vt 0.05 0.02/' -e 's/^vt 0.97 0.97/vt 1.2 0.97/' box.obj >bad.obj
     succeed_saying "note: " "box" "open edges" -- bake bad.obj "${SMALL[@]}" --size 128 --verbose -o out.exr
@@ -134,14 +152,6 @@ receiver() {
 
 # --- --dry-run: what a bake will take
 
-@test "a dry run estimates texels, voxels and memory, and writes nothing" {
-    old_output out.exr
-    succeed bake box.obj "${SMALL[@]}" --ao 0.5 -o out.exr --dry-run
-    prints texels voxels memory
-    [ -z "$stderr" ] || fail "something on standard error"
-    untouched out.exr
-}
-
 @test "a dry run needs no folder that a bake would make" {
     for out in new/ new/lit.glb; do
         succeed bake box.obj "${SMALL[@]}" --per-object -o "$out" --dry-run
@@ -157,9 +167,13 @@ receiver() {
 LIST
 }
 
-@test "a dry run's texels are the bake's, and its voxels within a quarter" {
-    succeed bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --dry-run
+@test "a dry run's texels are the bake's, its voxels within a quarter, and it writes nothing" {
     local texels
+    old_output out.exr
+    succeed bake box.obj "${SMALL[@]}" --ao 0.5 --size 200x90 -o out.exr --dry-run
+    prints texels voxels memory
+    [ -z "$stderr" ] || fail "something on standard error"
+    untouched out.exr
     texels=$(grep -o '^texels *[0-9]*' <<<"$output" | grep -o '[0-9]*$')
     succeed bake box.obj "${SMALL[@]}" --size 200x90 -o out.exr --quiet --stats stats.json
     [ "$texels" -eq "$(number_in stats.json texels)" ] || fail "$texels, and $(cat stats.json)"

@@ -45,11 +45,8 @@ prepare() {
     untouched out.exr
 }
 
-@test "--invalid writes PNG only" {
+@test "--invalid writes PNG only, and names its pictures apart if outputs have one name in several folders" {
     refuses 2 --invalid where.jpg .png -- bake box.obj "${SMALL[@]}" -o out.exr --invalid where.jpg
-}
-
-@test "--invalid names its pictures apart if outputs have one name in several folders" {
     mkdir a b
     local output outputs=()
     for output in a/wall.exr b/wall.exr; do
