@@ -182,8 +182,8 @@ int cli_write_json(const char *path, json_t *root);
 json_t *cli_number_json(double value);   /* null for NaN and infinity */
 json_t *cli_utf8_json(const char *text); /* null for NULL; bytes that are not UTF-8 become U+FFFD */
 
-/* Writes text with the special characters of HTML and XML escaped. */
-void cli_escape(FILE *out, const char *text);
+/* Writes text with the special characters of HTML and XML escaped, between markup. */
+void cli_write(FILE *out, const char *before, const char *text, const char *after);
 
 /* --- options: options.c */
 

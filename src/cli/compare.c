@@ -1,6 +1,7 @@
 /* vdbshade compare: compares a bake with its golden one, and explains the differences: in lines, as JSON, as
  * JUnit's XML for a CI, and as a page with pictures. */
 #include "compare.h"
+#include "base/clock.h"
 #include "base/text.h"
 
 #include <png.h>
@@ -419,33 +420,29 @@ static size_t count_tests(const cli_comparison *c, size_t *failures) {
     return tests;
 }
 
-/* Writes text with its special characters escaped, between markup. */
-static void write_escaped(FILE *out, const char *before, const char *text, const char *after) {
-    fputs(before, out);
-    cli_escape(out, text);
-    fputs(after, out);
-}
-
 static void write_case(FILE *out, const cli_comparison *c, const char *name, const char *failure) {
-    write_escaped(out, "    <testcase classname=\"", name_of(c), "\"");
-    write_escaped(out, " name=\"", name, failure[0] == '\0' ? "\"/>\n" : "\">\n");
+    cli_write(out, "    <testcase classname=\"", name_of(c), "\"");
+    cli_write(out, " name=\"", name, failure[0] == '\0' ? "\"/>\n" : "\">\n");
     if (failure[0] != '\0') {
-        write_escaped(out, "      <failure message=\"", failure, "\"/>\n    </testcase>\n");
+        cli_write(out, "      <failure message=\"", failure, "\"/>\n    </testcase>\n");
     }
 }
 
-static void write_junit(FILE *out, const cli_comparison *comparisons, size_t count) {
+static void write_junit(FILE *out, const cli_compare_settings *s, const cli_comparison *comparisons,
+                        size_t count) {
     size_t tests = 0, failures = 0;
     for (size_t i = 0; i < count; ++i) {
         tests += count_tests(&comparisons[i], &failures);
     }
-    fprintf(out, "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%zu\" failures=\"%zu\">\n",
-            tests, failures);
+    fprintf(out,
+            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"%zu\" failures=\"%zu\" "
+            "time=\"%.3f\">\n",
+            tests, failures, vshi_seconds() - s->began);
     for (size_t i = 0; i < count; ++i) {
         const cli_comparison *c = &comparisons[i];
         failures = 0;
         tests = count_tests(c, &failures);
-        write_escaped(out, "  <testsuite name=\"", name_of(c), "\"");
+        cli_write(out, "  <testsuite name=\"", name_of(c), "\"");
         fprintf(out, " tests=\"%zu\" failures=\"%zu\" errors=\"0\">\n", tests, failures);
         const char *problem;
         const vsh_channel_comparison *channel;
@@ -478,6 +475,22 @@ static const char *verdict(bool alike) {
     return alike ? "<span class=\"good\">alike</span>" : "<span class=\"bad\">not alike</span>";
 }
 
+/* Writes what the page shows, and how many comparisons passed in what time. */
+static void write_summary(FILE *out, const cli_compare_settings *s, const cli_comparison *comparisons,
+                          size_t count) {
+    const char *title = s->folder != NULL
+                            ? cli_keep_text("Bakes of %s", s->folder)
+                            : cli_keep_text("%s and %s", comparisons->golden, comparisons->fresh);
+    size_t passed = 0;
+    for (size_t i = 0; i < count; ++i) {
+        passed += comparisons[i].alike;
+    }
+    cli_write(out, "<title>", title, "</title>\n");
+    cli_write(out, "<h1>", title, "</h1>\n<p><b class=\"good\">");
+    fprintf(out, "%zu passed</b>, <b class=\"%s\">%zu failed</b> in %.1f s</p>\n", passed,
+            passed < count ? "bad" : "good", count - passed, vshi_seconds() - s->began);
+}
+
 static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
     const vsh_measures *m = &channel->measures;
     fputs("<table><tr><th>measure</th><th>value</th><th>limit</th></tr>\n", out);
@@ -499,9 +512,9 @@ static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
 }
 
 static void write_channel(FILE *out, const vsh_channel_comparison *channel, const char *pictures) {
-    write_escaped(out, "<h3>", channel->name, ": ");
+    cli_write(out, "<h3>", channel->name, ": ");
     fprintf(out, "%s</h3>\n", verdict(channel->alike));
-    write_escaped(out, "<p>", explain(channel), "</p>\n");
+    cli_write(out, "<p>", explain(channel), "</p>\n");
     if (channel->is_coverage) {
         fprintf(out,
                 "<p>%" PRIu64 " texels covered in golden, %" PRIu64 " in new, %" PRIu64
@@ -515,24 +528,34 @@ static void write_channel(FILE *out, const vsh_channel_comparison *channel, cons
     }
 }
 
-static void write_page(FILE *out, const cli_comparison *comparisons, size_t count) {
-    fputs(head, out);
-    fputs("<title>vdbshade: golden and new</title>\n<h1>Golden and new</h1>\n", out);
-    for (size_t i = 0; i < count; ++i) {
-        const cli_comparison *c = &comparisons[i];
-        write_escaped(out, "<h2>", name_of(c), ": ");
-        fprintf(out, "%s</h2>\n", verdict(c->alike));
-        if (c->golden != NULL && c->fresh != NULL) {
-            write_escaped(out, "<p>Golden: <code>", c->golden, "</code>");
-            write_escaped(out, ", new: <code>", c->fresh, "</code></p>\n");
-        }
-        const char *problem;
-        for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL; ++k) {
-            write_escaped(out, "<p class=\"bad\">", problem, "</p>\n");
-        }
-        const vsh_channel_comparison *channel;
+static void write_comparison(FILE *out, const cli_comparison *c) {
+    cli_write(out, "<h2>", name_of(c), ": ");
+    fprintf(out, "%s</h2>\n", verdict(c->alike));
+    if (c->golden != NULL && c->fresh != NULL) {
+        cli_write(out, "<p>Golden: <code>", c->golden, "</code>");
+        cli_write(out, ", new: <code>", c->fresh, "</code></p>\n");
+    }
+    const char *problem;
+    for (size_t k = 0; (problem = cli_comparison_problem(c, k)) != NULL; ++k) {
+        cli_write(out, "<p class=\"bad\">", problem, "</p>\n");
+    }
+    const vsh_channel_comparison *channel;
+    for (int alike = 0; alike < 2; ++alike) { /* failures first */
         for (size_t k = 0; (channel = vsh_comparison_channel(c->made, k)) != NULL; ++k) {
-            write_channel(out, channel, k < c->picture_count ? c->pictures[k] : NULL);
+            if ((channel->alike != 0) == alike) {
+                write_channel(out, channel, k < c->picture_count ? c->pictures[k] : NULL);
+            }
+        }
+    }
+}
+
+static void write_page(FILE *out, const cli_compare_settings *s, const cli_comparison *comparisons,
+                       size_t count) {
+    fputs(head, out);
+    write_summary(out, s, comparisons, count);
+    for (size_t i = 0; i < 2 * count; ++i) { /* failures first */
+        if (comparisons[i % count].alike == (i >= count)) {
+            write_comparison(out, &comparisons[i % count]);
         }
     }
     fprintf(out,
@@ -547,7 +570,7 @@ int cli_comparison_report(const cli_compare_settings *s, const cli_comparison *c
         cli_temporary report;
         if (paths[i] != NULL) {
             CLI_TRY(cli_temporary_begin(&report, paths[i]));
-            (i == 0 ? write_junit : write_page)(report.file, comparisons, count);
+            (i == 0 ? write_junit : write_page)(report.file, s, comparisons, count);
             CLI_TRY(cli_temporary_commit(&report));
         }
     }
@@ -562,7 +585,7 @@ static const cli_option options[] = {
 };
 
 static int compare_main(int argc, char **argv) {
-    cli_compare_settings s = {.options = vsh_compare_files_options_default()};
+    cli_compare_settings s = {.options = vsh_compare_files_options_default(), .began = vshi_seconds()};
     const char *files[2];
     CLI_TRY(cli_parse(&cli_compare, argc, argv, &s, files));
     const char *const reports[] = {s.junit, s.html};

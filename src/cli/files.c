@@ -289,9 +289,10 @@ json_t *cli_utf8_json(const char *text) {
     return json;
 }
 
-void cli_escape(FILE *out, const char *text) {
+void cli_write(FILE *out, const char *before, const char *text, const char *after) {
     static const char specials[] = "<>&\"";
     static const char *const escapes[] = {"&lt;", "&gt;", "&amp;", "&quot;"};
+    fputs(before, out);
     for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
         length = vshi_utf8_length(text);
         const char *special = strchr(specials, *text);
@@ -305,4 +306,5 @@ void cli_escape(FILE *out, const char *text) {
             fwrite(text, 1, length, out);
         }
     }
+    fputs(after, out);
 }

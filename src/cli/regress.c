@@ -3,6 +3,7 @@
  * The folder may be a stranger's that a CI runs as it came. So only the command line of `regress` may ask for
  * written files, or for files parsed unconfined. */
 #define _GNU_SOURCE /* memfd_create */
+#include "base/clock.h"
 #include "compare.h"
 
 #include <dirent.h>
@@ -454,7 +455,7 @@ static int bake_all(void) {
             continue;
         }
         one->status = UNLIKE;
-        if (cli_report_progress(NULL, one->name, 0.0) != 0) {
+        if (cli_report_progress(NULL, one->name, (double)i / (double)work.case_count) != 0) {
             return cli_cancelled();
         }
         cli_last_line[0] = '\0';
@@ -636,7 +637,9 @@ static int run_cases(void) {
 
 static int regress_main(int argc, char **argv) {
     work.settings.compare.options = vsh_compare_files_options_default();
+    work.settings.compare.began = vshi_seconds();
     CLI_TRY(cli_parse(&cli_regress, argc, argv, &work.settings, &work.settings.folder));
+    work.settings.compare.folder = work.settings.folder;
     const int code = run_cases();
     remove_folder();
     for (size_t i = 0; i < work.case_count; ++i) {

@@ -406,7 +406,7 @@ static void sort_runs(trade_subject *subject) {
 
 /* --- the plot: RMSE against time, both logarithmic */
 
-enum { WIDTH = 860, HEIGHT = 540, LEFT = 64, RIGHT = 164, TOP = 16, BOTTOM = 48 };
+enum { WIDTH = 1070, HEIGHT = 560, LEFT = 64, RIGHT = 164, TOP = 16, BOTTOM = 48 };
 
 /* The plot has its own style, because it is also cut out of the page. */
 static const char plot_style[] =
@@ -524,7 +524,8 @@ static void write_plot(FILE *out, const trade_work *work, const trade_subject *s
     widen(&p.x);
     widen(&p.y);
     fprintf(out,
-            "<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" role=\"img\" "
+            "<figure>\n<svg class=\"plot\" xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" "
+            "role=\"img\" "
             "aria-label=\"error against time\">\n%s<rect width=\"%d\" height=\"%d\" fill=\"#fff\"/>\n",
             WIDTH, HEIGHT, plot_style, WIDTH, HEIGHT);
     write_grid(&p, &p.x);
@@ -536,7 +537,7 @@ static void write_plot(FILE *out, const trade_work *work, const trade_subject *s
             (LEFT + WIDTH - RIGHT) / 2, HEIGHT - 10, (TOP + HEIGHT - BOTTOM) / 2);
     write_runs_drawn(&p);
     write_legend(&p, &work->settings->resolutions);
-    fputs("</svg>\n", out);
+    fputs("</svg>\n</figure>\n", out);
 }
 
 /* --- the tables */
@@ -587,7 +588,7 @@ static const char head[] =
     "<!doctype html>\n<html lang=\"en\"><meta charset=\"utf-8\">\n"
     "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n<style>\n"
     "body{font:15px/1.5 system-ui,sans-serif;margin:1.5em auto;max-width:1100px;padding:0 1em;"
-    "overflow-wrap:break-word}svg{width:100%;max-width:860px;min-width:640px;height:auto}"
+    "overflow-wrap:break-word}figure{margin:0;overflow-x:auto}svg{width:100%;min-width:640px;height:auto}"
     "table,pre{font-size:13px;overflow-x:auto}th,td{padding:.3em .6em;text-align:right}"
     "td.t,th.t{text-align:left}\n</style>\n";
 
@@ -615,9 +616,12 @@ static void write_conditions(FILE *out, const trade_work *work) {
 }
 
 static void write_page(FILE *out, const trade_work *work) {
-    fprintf(out, "%s<title>Speed against accuracy</title>\n<h1>Speed against accuracy: ", head);
-    cli_escape(out, work->settings->bake.input);
-    fputs("</h1>\n", out);
+    const char *input = cli_file_name(work->settings->bake.input);
+    fputs(head, out);
+    cli_write(out, "<title>", input, ": speed against accuracy</title>\n");
+    cli_write(out, "<h1>Speed against accuracy: ", input, "</h1>\n");
+    cli_write(out, "<p>", work->settings->page, ", made by ");
+    cli_write(out, "<code>vdbshade ", cli_parsed.command, "</code></p>\n");
     write_conditions(out, work);
     for (size_t s = 0; s < work->subject_count; ++s) {
         fprintf(out, "<h2>%s</h2>\n", work->subjects[s].ao ? "Ambient occlusion" : "Shadow");

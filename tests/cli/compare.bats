@@ -170,7 +170,7 @@ picture() {
     ends 1 compare golden.exr lost.exr --json --junit out.xml --html out.html
     [[ $output == '{'*'"alike": false'*'}' ]] || fail "no JSON"
     [ "$(grep -c '<testcase ' out.xml)" -eq 4 ] || fail "not a test case a channel, and one of the files"
-    grep -q '<testsuites tests="4" failures="2">' out.xml || fail "counts"
+    grep -q '<testsuites tests="4" failures="2" time=' out.xml || fail "counts"
     grep -q '<failure message="[^"<]*a lost caster?' out.xml || fail "no reason"
     [ "$(grep -o 'data:image/png;base64,iVBORw0KGgo[^"]*' out.html | wc -l)" -eq 6 ] || fail "not three pictures a channel"
     ! grep -qE '(src|href)="?(https?:|/|\.)' out.html || fail "the page needs something beside it"
@@ -178,7 +178,7 @@ picture() {
     no_leftovers
     succeed compare golden.exr golden.exr --quiet --junit out.xml
     [ -z "$output$stderr" ] || fail "not quiet"
-    grep -q '<testsuites tests="4" failures="0">' out.xml || fail "counts"
+    grep -q '<testsuites tests="4" failures="0" time=' out.xml || fail "counts"
 }
 
 @test "files that cannot be compared end with an error, not with a difference" {
