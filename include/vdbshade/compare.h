@@ -186,13 +186,19 @@ VSH_API vsh_result vsh_compare_files(const char *golden, const char *fresh,
                                      const vsh_compare_files_options *options, const vsh_run *run,
                                      vsh_comparison **comparison, vsh_error *error);
 
-/* 1 if all channels or grids are alike and there is no problem, else 0. */
-VSH_API int32_t vsh_comparison_alike(const vsh_comparison *comparison);
-
 /* Return the channels, and lines of text about problems, from index 0; NULL after the last. They belong to
  * the comparison. */
 VSH_API const vsh_channel_comparison *vsh_comparison_channel(const vsh_comparison *comparison, size_t index);
 VSH_API const char *vsh_comparison_problem(const vsh_comparison *comparison, size_t index);
+
+/* Returns 1 if all channels or grids are alike and there is no problem, else 0; 0 for NULL. */
+static inline int32_t vsh_comparison_alike(const vsh_comparison *comparison) {
+    const vsh_channel_comparison *channel = vsh_comparison_channel(comparison, 0);
+    for (size_t i = 1; channel != NULL && channel->alike; ++i) {
+        channel = vsh_comparison_channel(comparison, i);
+    }
+    return comparison != NULL && channel == NULL && vsh_comparison_problem(comparison, 0) == NULL;
+}
 
 VSH_API void vsh_comparison_free(vsh_comparison *comparison); /* NULL does nothing */
 

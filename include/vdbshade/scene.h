@@ -212,14 +212,14 @@ typedef struct vsh_scene {
     size_t receiver_count;
     vsh_grid_options grid;   /* of the casters' level set */
     vsh_shade_options shade; /* methods of shadow and AO */
-    int32_t ao;              /* nonzero: bake AO within shade.ao_distance */
-    vsh_bent_space bent;     /* with ao: bake bent normals in that space */
-    int32_t irradiance;      /* nonzero: bake irradiance */
-    vsh_tint tint;           /* tint of shadows and irradiance; VSH_TINT_NONE: none */
-    int32_t has_ambient;     /* nonzero: `ambient` applies */
-    double ambient[3];       /* as in vsh_lightmap */
-    vsh_planes planes;       /* further planes to bake */
-    int32_t error;           /* nonzero: bake the error left in shadow and AO, if the method knows it */
+    int32_t ao;          /* nonzero: bake AO within shade.ao_distance; 0 there: vsh_assets_info.ao_distance */
+    vsh_bent_space bent; /* with ao: bake bent normals in that space */
+    int32_t irradiance;  /* nonzero: bake irradiance */
+    vsh_tint tint;       /* tint of shadows and irradiance; VSH_TINT_NONE: none */
+    int32_t has_ambient; /* nonzero: `ambient` applies */
+    double ambient[3];   /* as in vsh_lightmap */
+    vsh_planes planes;   /* further planes to bake */
+    int32_t error;       /* nonzero: bake the error left in shadow and AO, if the method knows it */
     /* [solidity_count], for all mesh casters, over their own; each must match */
     const vsh_solidity_rule *solidity;
     size_t solidity_count;
@@ -322,8 +322,9 @@ VSH_API vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, co
 /* Each file is read once, however many casters and receivers use it. */
 typedef struct vsh_assets vsh_assets;
 
-/* Reads the files that a scene names, receivers first, and applies transforms. The scene need not outlive the
- * call. Free the result with vsh_assets_free(). Errors:
+/* Reads the files that a scene names, receivers first, and applies transforms. If the scene has AO within 0,
+ * sets shade.ao_distance to vsh_assets_info.ao_distance. The scene need not outlive the call. Free the result
+ * with vsh_assets_free(). Errors:
  * - VSH_ERROR_ARGUMENT: scene or assets NULL; an unknown type; a caster or receiver without a path, or whose
  *   transform is not finite or flattens; a UV set out of range; run;
  * - VSH_ERROR_INPUT: a receiver's mesh without UVs or without the set; a pattern that matches no mesh, or
@@ -332,9 +333,20 @@ typedef struct vsh_assets vsh_assets;
  * - VSH_ERROR_READ, VSH_ERROR_LIMIT (for each file), VSH_ERROR_UNSUPPORTED: as the calls that read single
  *   files;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-VSH_API vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
+VSH_API vsh_result vsh_assets_load(vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
                                    vsh_error *error);
 VSH_API void vsh_assets_free(vsh_assets *assets); /* NULL does nothing */
+
+/* Size of a scene, world units. */
+typedef struct vsh_assets_info {
+    double bounds_min[3]; /* box of the casters and receivers; min > max if they have no extent */
+    double bounds_max[3]; /* the other corner */
+    double area;          /* of the receiver with the largest surface; 0: there are no receivers */
+    double ao_distance;   /* a twelfth of the box's diagonal, to three digits; 0 for a point */
+} vsh_assets_info;
+
+/* Fills *info. Cannot fail. */
+VSH_API void vsh_assets_get_info(const vsh_assets *assets, vsh_assets_info *info);
 
 /* Return the meshes of receiver (caster) `index` in the world, with the receiver's UV set. Views that belong
  * to the assets. NULL and a count of 0 beyond the last, and for casters without triangles. */
@@ -520,6 +532,7 @@ typedef struct vsh_bake_report {
     vsh_occluders_info occluders; /* of the scene */
     /* [2 + lights of the scene], the caller's: of each light, AO and the sky; NULL: not wanted */
     vsh_bake_error *errors;
+    double ao_distance; /* of AO, world units; 0: there is none */
 } vsh_bake_report;
 
 /* Checks whether the image or asset of receiver `index` can be written, without reading a file. Errors: as
@@ -563,6 +576,7 @@ typedef struct vsh_bake_forecast {
     double grid_bytes;     /* of the level sets */
     double field_bytes;    /* of the fields */
     int32_t has_triangles; /* nonzero: triangles are traced, and auto is exact */
+    double ao_distance;    /* of AO, world units; 0: there is none */
 } vsh_bake_forecast;
 
 /* Forecasts vsh_bake_scene() of the whole scene. The outputs' folders need not exist. Errors: as there. */

@@ -37,6 +37,23 @@ static inline vshi_vec vshi_cross(vshi_vec a, vshi_vec b) {
 static inline double vshi_length(vshi_vec a) {
     return sqrt(vshi_dot(a, a));
 }
+
+/* Rounds to three digits, and above 1000 to a whole number, so that "%.10g" reads back as the same double. */
+static inline double vshi_round_digits(double value) {
+    double scale = 1.0; /* powers of ten are exact up to 1e22 */
+    while (value * scale < 100.0 && scale < 1e22) {
+        scale *= 10.0;
+    }
+    return floor(value * scale + 0.5) / scale;
+}
+
+/* Returns the AO distance of `auto` for casters and receivers in a box: a twelfth of its diagonal. 0 for a
+ * point, and for an empty box. */
+static inline double vshi_auto_ao_distance(const double min[3], const double max[3]) {
+    enum { PART = 12 };
+    const vshi_vec diagonal = vshi_sub(vshi_vec_of(max), vshi_vec_of(min));
+    return min[0] <= max[0] ? vshi_round_digits(vshi_length(diagonal) / PART) : 0.0;
+}
 static inline bool vshi_finite(vshi_vec a) {
     return isfinite(a.x) && isfinite(a.y) && isfinite(a.z);
 }

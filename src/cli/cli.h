@@ -439,6 +439,9 @@ int cli_stats_finish(const cli_stats *stats, const char *path);
 /* Prints the summary on standard error, unless --quiet. */
 void cli_stats_say(const cli_stats *stats);
 
+/* Prints the AO distance that a load chose, unless the scene names one. */
+void cli_say_auto_ao(const vsh_scene *scene, double distance);
+
 /* Notes about an output's inputs and options. */
 typedef struct cli_provenance {
     vsh_provenance *made;

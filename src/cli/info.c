@@ -1,4 +1,5 @@
 /* vdbshade info: what a file holds, and what is wrong with it. */
+#include "base/vec.h"
 #include "cli.h"
 
 #include <stdarg.h>
@@ -14,7 +15,7 @@ typedef struct info_settings {
 static const cli_option options[] = {
     {.help = "Options"},
     {"json", NULL, "print the same facts as one JSON object", CLI_VALUE(FLAG, info_settings, json)},
-    {"size", "W[xH]", "texels of the lightmap that UVs are checked in (1024)",
+    {"size", "W[xH]", "texels of the lightmap that UVs are checked in, and suggestions made for (1024)",
      CLI_VALUE(SIZE, info_settings, size)},
     CLI_VERBOSE_OPTION("a paragraph for each mesh, however many there are"),
     {"unit", CLI_SETTING},
@@ -82,6 +83,49 @@ static json_t *three(const double value[3]) {
 
 static json_t *size_of(int32_t width, int32_t height) {
     return json_pack("[i,i]", width, height);
+}
+
+/* --- bounds, and options that suit them */
+
+static void state_bounds(json_t *to, const char *indent, const double low[3], const double high[3]) {
+    state(to, "bounds", json_pack("[o,o]", three(low), three(high)), "%sbounds: %g %g %g to %g %g %g\n",
+          indent, low[0], low[1], low[2], high[0], high[1], high[2]);
+}
+
+/* Share of a lightmap that charts cover: vsh_unwrap() covers 0.7 to 0.8 of 1024 × 1024 texels. */
+static const double COVERED = 2.0 / 3.0;
+
+/* Suggests options of `bake` for bounds, and for receivers of an area unless it is 0. */
+static void suggest_options(json_t *root, const vsh_assets_info *of, const int32_t size[2]) {
+    const double density = vshi_round_digits(sqrt(COVERED * size[0] * size[1] / of->area));
+    if (of->ao_distance == 0.0) {
+        return;
+    }
+    json_t *made = add(root, "suggested", json_object());
+    state_bounds(root, "", of->bounds_min, of->bounds_max);
+    state(made, "ao", json_real(of->ao_distance), "suggested: --ao %.10g", of->ao_distance);
+    if (of->area > 0.0) {
+        state(made, "texels_per_unit", json_real(density), " --texels-per-unit %.10g", density);
+        state(made, "size", size_of(size[0], size[1]), " --size %dx%d", size[0], size[1]);
+    }
+    if (!as_json) {
+        printf("  # a twelfth of the diagonal%s\n", of->area > 0.0 ? "; charts fill two thirds" : "");
+    }
+}
+
+/* States the size of what a scene's files hold; false if they cannot be loaded. */
+static bool state_size(json_t *root, vsh_scene *scene, const int32_t size[2]) {
+    vsh_run quiet = cli_run;
+    vsh_assets_info info;
+    vsh_assets *assets;
+    quiet.warning = NULL;
+    if (vsh_assets_load(scene, &quiet, &assets, &cli_error) != VSH_OK) {
+        return false;
+    }
+    vsh_assets_get_info(assets, &info);
+    vsh_assets_free(assets);
+    suggest_options(root, &info, size);
+    return true;
 }
 
 /* --- images */
@@ -172,7 +216,7 @@ static void state_grid(json_t *grids, const vsh_vdb_entry *g) {
     json_array_append_new(grids, grid);
 }
 
-static int state_vdb(json_t *root, const char *path, const char *name) {
+static int state_vdb(json_t *root, const char *path, const char *name, const int32_t size[2]) {
     vsh_vdb_entry *entries = calloc(MAX_LISTED, sizeof *entries);
     json_t *grids = add(root, "grids", json_array());
     size_t count = 0;
@@ -192,6 +236,13 @@ static int state_vdb(json_t *root, const char *path, const char *name) {
               count - MAX_LISTED);
     }
     free(entries);
+    vsh_caster caster = vsh_caster_default();
+    caster.type = VSH_CASTER_VDB;
+    caster.path = path;
+    caster.grid = name;
+    if (code == CLI_OK) { /* what cannot cast has a problem, or needs none */
+        state_size(root, &(vsh_scene){.casters = &caster, .caster_count = 1}, size);
+    }
     return code;
 }
 
@@ -210,9 +261,12 @@ static void state_caster(json_t *casters, const vsh_caster *caster, size_t index
           "caster %zu: %s%s\n", index, type, file);
 }
 
-static int state_scene(json_t *root, const char *path) {
+static int state_scene(json_t *root, const char *path, const int32_t size[2]) {
     vsh_scene *scene = NULL;
     CLI_TRY(cli_check(vsh_scene_read(path, &cli_run, &scene, &cli_error)));
+    if (!state_size(root, scene, size)) {
+        complain(root, "", "problem", "%s", cli_error.message);
+    }
     json_t *casters = add(root, "casters", json_array()), *layers = add(root, "layers", json_array());
     json_t *lights = add(root, "lights", json_array()), *receivers = add(root, "receivers", json_array());
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -262,7 +316,9 @@ typedef struct mesh_info {
     const char *path;
     const vsh_model *model;
     size_t count;
+    double scale;                  /* to the unit that was asked for */
     vsh_mesh *meshes;              /* [count] */
+    vsh_mesh_report *checks;       /* [count]: in that unit */
     vsh_solidity_report *solidity; /* [count] */
     vsh_mesh *with_uvs;            /* [with_uv_count] */
     vsh_uv_report *reports;        /* [with_uv_count] */
@@ -322,6 +378,23 @@ static int state_lights(json_t *root, const char *path, double unit) {
     return CLI_OK;
 }
 
+/* Checks the meshes, and states the size of all. */
+static int measure_meshes(json_t *root, const mesh_info *info) {
+    vsh_assets_info all = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, 0.0, 0.0};
+    for (size_t i = 0; i < info->count; ++i) {
+        vsh_mesh_report *check = &info->checks[i];
+        CLI_TRY(cli_check_input(vsh_mesh_check(&info->meshes[i], check, &cli_error)));
+        for (int k = 0; k < 3; ++k) {
+            all.bounds_min[k] = fmin(all.bounds_min[k], check->bounds_min[k] *= info->scale);
+            all.bounds_max[k] = fmax(all.bounds_max[k], check->bounds_max[k] *= info->scale);
+        }
+        all.area += check->area *= info->scale * info->scale;
+    }
+    all.ao_distance = vshi_auto_ao_distance(all.bounds_min, all.bounds_max);
+    suggest_options(root, &all, info->settings->size);
+    return CLI_OK;
+}
+
 /* Formats a list such as "2 solids, 1 wall with air in front of faces". */
 static const char *describe_solidity(const vsh_solidity_report *report) {
     const struct {
@@ -345,18 +418,10 @@ static const char *describe_solidity(const vsh_solidity_report *report) {
 static int state_mesh(json_t *of, const mesh_info *info, size_t index, const vsh_uv_report *uv) {
     const info_settings *s = info->settings;
     const vsh_solidity_report *solidity = &info->solidity[index];
-    vsh_mesh mesh = info->meshes[index];
-    double scaled[12]; /* the user gives the unit of positions */
-    const double own = vsh_model_unit(info->model), scale = s->unit / (own > 0.0 ? own : 1.0);
-    for (int i = 0; i < 12; ++i) {
-        scaled[i] = mesh.transform[i] * (s->unit > 0.0 ? scale : 1.0);
-    }
-    mesh.transform = scaled;
-    vsh_mesh_report report;
+    const vsh_mesh_report report = info->checks[index];
+    const vsh_mesh mesh = info->meshes[index];
     vsh_uvs_measures uvs;
-    CLI_TRY(cli_check_input(vsh_mesh_check(&mesh, &report, &cli_error)));
     CLI_TRY(cli_check_input(vsh_uvs_measure(&mesh, s->size[0], s->size[1], &uvs, &cli_error)));
-    const double *low = report.bounds_min, *high = report.bounds_max;
     const int32_t sets = vsh_model_uv_sets(info->model, index);
     const char *taken_for = describe_solidity(solidity);
     state(of, "name", cli_utf8_json(name_of(&mesh)), "mesh %zu '%s'\n", index, name_of(&mesh));
@@ -367,14 +432,14 @@ static int state_mesh(json_t *of, const mesh_info *info, size_t index, const vsh
     state(of, "uv_sets", json_integer(sets), "  UV sets: %d\n", sets);
     if (uvs.texels_per_unit > 0.0) {
         state(of, "lightmap_uvs",
-              json_pack("{s:f,s:f}", "texels_per_unit", uvs.texels_per_unit, "stretch", uvs.stretch),
-              "  lightmap UVs: %.4g texels a unit at %d × %d, stretch %.3f\n", uvs.texels_per_unit,
-              s->size[0], s->size[1], uvs.stretch);
+              json_pack("{s:f,s:f}", "texels_per_unit", uvs.texels_per_unit / info->scale, "stretch",
+                        uvs.stretch),
+              "  lightmap UVs: %.4g texels a unit at %d × %d, stretch %.3f\n",
+              uvs.texels_per_unit / info->scale, s->size[0], s->size[1], uvs.stretch);
     }
     state(of, "normals", json_boolean(mesh.normals != NULL), "  normals: %s\n",
           mesh.normals != NULL ? "yes" : "no, flat");
-    state(of, "bounds", json_pack("[o,o]", three(low), three(high)), "  bounds: %g %g %g to %g %g %g\n",
-          low[0], low[1], low[2], high[0], high[1], high[2]);
+    state_bounds(of, "  ", report.bounds_min, report.bounds_max);
     state(of, "area", json_real(report.area), "  area: %g\n", report.area);
     if (mesh.alpha != VSH_ALPHA_OPAQUE) {
         const bool blended = mesh.alpha == VSH_ALPHA_BLENDED;
@@ -489,6 +554,7 @@ static int state_info(json_t *root, mesh_info *info) {
     const int32_t *size = info->settings->size;
     state_summary(root, info);
     state_unit(root, info->model, info->settings->unit);
+    CLI_TRY(measure_meshes(root, info));
     CLI_TRY(
         cli_check_input(vsh_mesh_solidity(info->meshes, info->count, &cli_run, info->solidity, &cli_error)));
     CLI_TRY(info->with_uv_count > 0 ? measure_uvs(info) : CLI_OK);
@@ -515,11 +581,15 @@ static int state_model(json_t *root, const char *path, const info_settings *sett
     vsh_model *model = NULL;
     CLI_TRY(cli_check_input(vsh_model_read(path, &cli_run, &model, &cli_error)));
     const size_t count = vsh_model_mesh_count(model);
+    const double own = vsh_model_unit(model);
+    const double scale = settings->unit > 0.0 ? settings->unit / (own > 0.0 ? own : 1.0) : 1.0;
     mesh_info info = {.settings = settings,
+                      .scale = scale,
                       .path = path,
                       .model = model,
                       .count = count,
                       .meshes = calloc(count, sizeof *info.meshes),
+                      .checks = calloc(count, sizeof *info.checks),
                       .solidity = calloc(count, sizeof *info.solidity),
                       .with_uvs = calloc(count, sizeof *info.with_uvs),
                       .reports = calloc(count, sizeof *info.reports)};
@@ -533,6 +603,7 @@ static int state_model(json_t *root, const char *path, const info_settings *sett
     free(info.reports);
     free(info.with_uvs);
     free(info.solidity);
+    free(info.checks);
     free(info.meshes);
     vsh_model_free(model);
     return code;
@@ -551,8 +622,8 @@ static int info_main(int argc, char **argv) {
     s.unit = scene.unit;
     as_json = s.json;
     json_t *root = json_object();
-    const int code = cli_has_ending(path, "vdb")           ? state_vdb(root, path, cli_parsed.grid)
-                     : cli_has_ending(path, "json")        ? state_scene(root, path)
+    const int code = cli_has_ending(path, "vdb")           ? state_vdb(root, path, cli_parsed.grid, s.size)
+                     : cli_has_ending(path, "json")        ? state_scene(root, path, s.size)
                      : cli_has_ending(path, IMAGE_ENDINGS) ? state_image(root, path)
                                                            : state_model(root, path, &s);
     if (as_json && code == CLI_OK) {
@@ -564,9 +635,9 @@ static int info_main(int argc, char **argv) {
 
 const cli_command cli_info = {
     "info", "FILE [options]", "what a mesh, .vdb, scene or image holds, and its problems",
-    "Prints what a file holds and what is wrong with it. Meshes: objects, triangles, UV sets, bounds,\n"
-    "open, flipped and degenerate parts, whether they are solid, UVs that overlap within or between\n"
-    "objects. OpenVDB files (FILE.vdb, or FILE.vdb:GRID): class, voxel size, band, bounds, memory of\n"
-    "each grid, and why it cannot cast. Scenes (.json): casters, lights, receivers. Images: size, and\n"
-    "the range of each channel.",
+    "Prints what a file holds and what is wrong with it: bounds, and options of 'bake' that suit them.\n"
+    "Meshes: objects, triangles, UV sets, open, flipped and degenerate parts, whether they are solid,\n"
+    "UVs that overlap within or between objects. OpenVDB files (FILE.vdb, or FILE.vdb:GRID): class,\n"
+    "voxel size, band, memory of each grid, and why it cannot cast. Scenes (.json): casters, lights,\n"
+    "receivers. Images: size, and the range of each channel.",
     CLI_ENDING(options, info_main)};

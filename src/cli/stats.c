@@ -307,6 +307,12 @@ void cli_stats_say(const cli_stats *stats) {
                s[CLI_STAGE_BAKE], s[CLI_STAGE_WRITE]);
 }
 
+void cli_say_auto_ao(const vsh_scene *scene, double distance) {
+    if (scene->ao != 0 && scene->shade.ao_distance == 0.0) {
+        cli_inform("AO within %g: a twelfth of the diagonal of casters and receivers", distance);
+    }
+}
+
 /* --- provenance */
 
 int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,

@@ -136,8 +136,10 @@ static const cli_option options[] = {
 /* --- the scene */
 
 static int load(trade_work *work) {
-    const vsh_scene *scene = work->scene;
+    vsh_scene *scene = work->scene;
+    const vsh_scene given = *scene;
     CLI_TRY(cli_check_input(vsh_assets_load(scene, &cli_run, &work->assets, &cli_error)));
+    cli_say_auto_ao(&given, scene->shade.ao_distance);
     work->receivers = calloc(scene->receiver_count, sizeof *work->receivers);
     for (int k = 0; k < 3; ++k) {
         work->low[k] = INFINITY;

@@ -17,7 +17,7 @@ static const cli_option options[] = {
     CLI_COMMON_OPTIONS,
 };
 
-static int voxelize(const voxelize_settings *s, const vsh_scene *scene) {
+static int voxelize(const voxelize_settings *s, vsh_scene *scene) {
     const char *output = s->bake.output, *input = s->bake.input;
     CLI_TRY(cli_check_outputs(&output, 1, &input, 1, scene));
     cli_signals_watch();

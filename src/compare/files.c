@@ -185,7 +185,6 @@ struct vsh_comparison {
     size_t channel_count, channel_capacity;
     char (*problems)[320]; /* other sizes, channels, voxels, formats */
     size_t problem_count, problem_capacity;
-    bool alike;
 };
 
 typedef struct files {
@@ -633,11 +632,9 @@ static vsh_result compare(files *f, vsh_error *error) {
         VSHI_TRY(grids ? compare_grids(f, error) : compare_images(f, error));
     }
     vsh_comparison *c = f->comparison;
-    c->alike = c->problem_count == 0;
     for (size_t i = 0; i < c->channel_count; ++i) {
         vsh_channel_comparison *channel = &c->channels[i];
         channel->alike = channel->failed == 0 && !channel->coverage_failed;
-        c->alike = c->alike && channel->alike;
     }
     return VSH_OK;
 }
@@ -661,10 +658,6 @@ vsh_result vsh_compare_files(const char *golden, const char *fresh, const vsh_co
     }
     *comparison = f.comparison;
     return VSH_OK;
-}
-
-int32_t vsh_comparison_alike(const vsh_comparison *comparison) {
-    return comparison != NULL && comparison->alike;
 }
 
 const vsh_channel_comparison *vsh_comparison_channel(const vsh_comparison *comparison, size_t index) {

@@ -129,22 +129,17 @@ static void grow_box(assembly *a, const double min[3], const double max[3], cons
     }
 }
 
-/* Checks a caster, and gathers its meshes, its box and its tree. */
-static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
-    const vsh_caster *caster = &a->of->scene->casters[i];
-    const vshi_asset_place *place = vshi_assets_caster(a->of->assets, i);
-    VSHI_TRY(check_caster(caster, place, i, error));
+/* Grows the box by a caster; `tree` and its transform if it is one. */
+static void grow_by_caster(assembly *a, const vsh_caster *caster, const vshi_asset_place *place,
+                           const vsh_sdf *tree, const double *transform) {
     for (size_t k = 0; k < place->count; ++k) {
         const vsh_mesh_report *report = &place->meshes[k].checked->report;
         grow_box(a, report->bounds_min, report->bounds_max, NULL);
-        a->meshes[a->mesh_count++] = place->meshes[k];
     }
-    if (caster->type == VSH_CASTER_SDF) {
-        placed_sdf *placed = &a->sdfs[i];
+    if (tree != NULL) {
         double min[3], max[3];
-        VSHI_TRY(place_sdf(caster, placed, error));
-        vshi_sdf_bounds(&placed->sdf, min, max);
-        grow_box(a, min, max, placed->transform);
+        vshi_sdf_bounds(tree, min, max);
+        grow_box(a, min, max, transform);
     } else if (caster->type == VSH_CASTER_VDB) {
         vsh_grid_info info;
         vsh_grid_get_info(place->grid, &info);
@@ -161,7 +156,42 @@ static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
         vshi_spheres_get_info(place->spheres, &info);
         grow_box(a, info.bounds_min, info.bounds_max, NULL);
     }
+}
+
+/* Checks a caster, and gathers its meshes, its box and its tree. */
+static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
+    const vsh_caster *caster = &a->of->scene->casters[i];
+    const vshi_asset_place *place = vshi_assets_caster(a->of->assets, i);
+    const bool tree = caster->type == VSH_CASTER_SDF;
+    VSHI_TRY(check_caster(caster, place, i, error));
+    VSHI_TRY(tree ? place_sdf(caster, &a->sdfs[i], error) : VSH_OK);
+    grow_by_caster(a, caster, place, tree ? &a->sdfs[i].sdf : NULL, a->sdfs[i].transform);
+    for (size_t k = 0; k < place->count; ++k) {
+        a->meshes[a->mesh_count++] = place->meshes[k];
+    }
     return VSH_OK;
+}
+
+vsh_assets_info vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets) {
+    assembly a = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
+    double most = 0.0;
+    for (size_t i = 0; i < scene->caster_count; ++i) {
+        const vsh_caster *c = &scene->casters[i];
+        const bool tree = c->type == VSH_CASTER_SDF && vshi_sdf_check(&c->sdf, NULL) == VSH_OK;
+        grow_by_caster(&a, c, vshi_assets_caster(assets, i), tree ? &c->sdf : NULL, c->transform);
+    }
+    for (size_t i = 0; i < scene->receiver_count; ++i) {
+        const vshi_asset_place *place = vshi_assets_receiver(assets, i);
+        double area = 0.0;
+        grow_by_caster(&a, &(vsh_caster){.type = VSH_CASTER_MESH}, place, NULL, NULL);
+        for (size_t k = 0; k < place->count; ++k) {
+            area += place->meshes[k].checked->report.area;
+        }
+        most = fmax(most, area);
+    }
+    vsh_assets_info info = {{a.low.x, a.low.y, a.low.z}, {a.high.x, a.high.y, a.high.z}, most, 0.0};
+    info.ao_distance = vshi_auto_ao_distance(info.bounds_min, info.bounds_max);
+    return info;
 }
 
 /* Chooses the voxel size on which casters of several kinds must agree before the first is voxelised. A

@@ -39,6 +39,7 @@ struct vsh_assets {
     vshi_asset_place *receivers;
     size_t receiver_count;
     vshi_mesh_set set; /* of the casters' meshes */
+    vsh_assets_info info;
 };
 
 static bool is_same(const char *a, const char *b) {
@@ -711,8 +712,7 @@ static vsh_result check_transform(const double transform[12], const char *list, 
     return VSH_OK;
 }
 
-vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_assets **assets,
-                           vsh_error *error) {
+vsh_result vsh_assets_load(vsh_scene *scene, const vsh_run *run, vsh_assets **assets, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NEEDS(assets);
     *assets = NULL;
@@ -748,6 +748,10 @@ vsh_result vsh_assets_load(const vsh_scene *scene, const vsh_run *run, vsh_asset
     for (size_t i = 0; i < casters + receivers; ++i) {
         VSHI_TRY_DONE(check_triangles(i < casters ? &loaded->casters[i] : &loaded->receivers[i - casters],
                                       &full, error));
+    }
+    loaded->info = vshi_scene_measure(scene, loaded);
+    if (scene->ao != 0 && scene->shade.ao_distance == 0.0) {
+        scene->shade.ao_distance = loaded->info.ao_distance;
     }
     *assets = loaded;
     loaded = NULL;
@@ -789,6 +793,10 @@ void vsh_assets_free(vsh_assets *assets) {
 }
 
 /* --- loaded assets */
+
+void vsh_assets_get_info(const vsh_assets *assets, vsh_assets_info *info) {
+    *info = assets->info;
+}
 
 const vshi_asset_place *vshi_assets_caster(const vsh_assets *assets, size_t index) {
     static const vshi_asset_place none;

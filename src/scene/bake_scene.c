@@ -150,6 +150,7 @@ static vsh_result load(vshi_scene_bake *bake, const vsh_scene *scene, const vsh_
         light_assets(&bake->scene);
     }
     VSHI_TRY(vsh_assets_load(&bake->scene, &bake->run, &bake->assets, error));
+    bake->report.ao_distance = bake->scene.ao != 0 ? bake->scene.shade.ao_distance : 0.0;
     VSHI_TRY(vshi_list_lightmaps(bake, error));
     const vshi_array arrays[] = {VSHI_ARRAY(bake->errors, bake->error_count),
                                  VSHI_ARRAY(bake->lit, bake->error_count)};
@@ -653,6 +654,7 @@ vsh_result vsh_forecast_scene(const vsh_scene *scene, const vsh_bake_options *op
     VSHI_TRY_DONE(try_few_voxels(&bake, &f, error));
     f.lightmap_count = bake.target_count;
     f.samples = bake.report.samples;
+    f.ao_distance = bake.report.ao_distance;
     for (size_t i = 0; i < bake.target_count; ++i) {
         f.texels += bake.lightmaps[i].covered;
     }

@@ -85,10 +85,7 @@ static vsh_result read_scene(vshi_json *reader, const vshi_value *root, void *ma
 
 vsh_result vsh_flat_scene_read(const char *path, const vsh_run *run, vsh_flat_scene **scene,
                                vsh_error *error) {
-    VSHI_FLOATS;
     VSHI_NEEDS(scene);
-    *scene = NULL;
-    VSHI_NEEDS(path);
     void *made;
     const vsh_result result = vshi_scene_file_read(path, run, sizeof **scene, read_scene, &made, error);
     *scene = made;

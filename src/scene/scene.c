@@ -65,18 +65,22 @@ static vsh_result read_density(vshi_json *reader, const vshi_value *value, void 
     return VSH_OK;
 }
 
+/* Reads a number by the key, or "auto", for which the member stays. */
+static vsh_result read_auto(vshi_json *reader, const vshi_value *value, const vshi_key *key, void *member) {
+    if (!json_is_string(value->json)) {
+        return vshi_read_value(reader, value, key, member);
+    }
+    return strcmp(json_string_value(value->json), "auto") == 0
+               ? VSH_OK
+               : vshi_json_fail(reader, value, "\"%.64s\" is none of auto, a number from %g to %g",
+                                json_string_value(value->json), key->lowest, key->highest);
+}
+
 /* Texels, or "auto". */
 static vsh_result read_padding(vshi_json *reader, const vshi_value *value, void *member) {
     const vshi_key key = {.kind = VSHI_INTEGER, .highest = 4096.0};
-    int32_t *padding = member;
-    if (!json_is_string(value->json)) {
-        return vshi_read_value(reader, value, &key, padding);
-    }
-    *padding = VSH_PADDING_AUTO;
-    return strcmp(json_string_value(value->json), "auto") == 0
-               ? VSH_OK
-               : vshi_json_fail(reader, value, "\"%.64s\" is none of auto, a whole number from 0 to 4096",
-                                json_string_value(value->json));
+    *(int32_t *)member = VSH_PADDING_AUTO;
+    return read_auto(reader, value, &key, member);
 }
 
 enum {
@@ -298,12 +302,21 @@ static vsh_result check_outputs(vshi_json *reader, const vshi_value *value, cons
     return result;
 }
 
+/* Scene units, or "auto": 0, until the assets are loaded. */
+static vsh_result read_ao_distance(vshi_json *reader, const vshi_value *value, void *member) {
+    const vshi_key key = {.kind = VSHI_NUMBER, .lowest = VSHI_SMALLEST_LENGTH, .highest = VSHI_LARGEST};
+    *(double *)member = 0.0;
+    return read_auto(reader, value, &key, member);
+}
+
 #define AT(member) .offset = offsetof(vsh_scene, member)
 static const vshi_key ao_keys[] = {
-    VSHI_KEY("distance", NUMBER, AT(shade.ao_distance), .required = VSHI_ALL, .lowest = VSHI_SMALLEST_LENGTH,
-             .highest = VSHI_LARGEST, .flag = offsetof(vsh_scene, ao),
-             VSHI_OPTION("ao", "DISTANCE", OCCLUSION, "ambient occlusion within a distance, scene units",
-                         .otherwise = "none")),
+    VSHI_KEY("distance", CUSTOM, AT(shade.ao_distance), .required = VSHI_ALL, .read = read_ao_distance,
+             .flag = offsetof(vsh_scene, ao),
+             VSHI_OPTION("ao", "DISTANCE", OCCLUSION,
+                         "ambient occlusion within a distance, scene units; auto: a twelfth of the diagonal "
+                         "of casters and receivers",
+                         .range = "a number from 1e-12 to 1e+15, or auto", .otherwise = "none")),
     VSHI_KEY("method", NAME, AT(shade.ao_method), .names = VSH_NAMES_AO,
              VSHI_OPTION("ao-method", "NAME", OCCLUSION, "method of AO; cones and taps are previews")),
     VSHI_KEY("cones", INTEGER, AT(shade.ao_cones),
@@ -580,8 +593,10 @@ vsh_result vshi_scene_parse(const char *path, const char *text, size_t size, vsh
 
 vsh_result vshi_scene_file_read(const char *path, const vsh_run *run, size_t size, vshi_read_fn *read,
                                 void **made, vsh_error *error) {
+    VSHI_FLOATS;
     vsh_run full;
     *made = NULL;
+    VSHI_NEEDS(path);
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(vshi_unsupported_check(path, error));
     vshi_json reader = {.path = path, .run = &full, .error = error};
@@ -589,10 +604,7 @@ vsh_result vshi_scene_file_read(const char *path, const vsh_run *run, size_t siz
 }
 
 vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error) {
-    VSHI_FLOATS;
     VSHI_NEEDS(scene);
-    *scene = NULL;
-    VSHI_NEEDS(path);
     void *made;
     const vsh_result result = vshi_scene_file_read(path, run, sizeof **scene, read_scene, &made, error);
     *scene = made;
@@ -676,6 +688,7 @@ static vsh_result set(int32_t owner, const char *name, const char *text, void *t
     } changed;
     size_t place;
     const vshi_key *key;
+    VSHI_NEEDS(name);
     for (size_t i = 0; (key = find_key(i, &place)) != NULL; ++i) {
         if (places[place].owner == owner && is_called(key, places[place].prefix, name)) {
             memcpy(&changed, target, size);
@@ -689,18 +702,15 @@ static vsh_result set(int32_t owner, const char *name, const char *text, void *t
 
 vsh_result vsh_scene_set(vsh_scene *scene, const char *name, const char *text, vsh_error *error) {
     VSHI_NEEDS(scene);
-    VSHI_NEEDS(name);
     return set(VSH_SETTING_OF_SCENE, name, text, scene, sizeof *scene, error);
 }
 
 vsh_result vsh_receiver_set(vsh_receiver *receiver, const char *name, const char *text, vsh_error *error) {
     VSHI_NEEDS(receiver);
-    VSHI_NEEDS(name);
     return set(VSH_SETTING_OF_RECEIVER, name, text, receiver, sizeof *receiver, error);
 }
 
 vsh_result vsh_flat_scene_set(vsh_flat_scene *scene, const char *name, const char *text, vsh_error *error) {
     VSHI_NEEDS(scene);
-    VSHI_NEEDS(name);
     return set(VSH_SETTING_OF_FLAT, name, text, scene, sizeof *scene, error);
 }

@@ -251,7 +251,7 @@ vsh_result vsh_view_write_scene(const char *path, const char *name, const vsh_sc
     vsh_caster *casters = NULL;
     vsh_assets *assets = NULL;
     vsh_occluders *occluders = NULL;
-    surface s = {.path = path, .scene = scene, .run = &full};
+    surface s = {.path = path, .scene = &voxelised, .run = &full};
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&casters, scene->caster_count, sizeof *casters, name, error));
     for (size_t i = 0; i < scene->caster_count; ++i) {

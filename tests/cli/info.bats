@@ -2,12 +2,13 @@
 load helper
 
 @test "info lists the contents of a mesh, a level set and a scene" {
-    info_tells box.obj "triangles: 12" "UV sets: 1" "bounds: 0 0 0 to 1 1 1"
+    # an area of 6 fills two thirds of 1024 × 1024 texels
+    info_tells box.obj "bounds: 0 0 0 to 1 1 1" "suggested: --ao 0.144 --texels-per-unit 341 --size 1024x1024" "triangles: 12" "UV sets: 1" "bounds: 0 0 0 to 1 1 1"
     [[ $output != *problem* ]] || fail "a problem"
     succeed info "$ASSETS/cloister.glb"
     [[ $output != *"other charts"* && $output != *"leave the UV square"* ]] || fail "UVs"
     succeed voxelize box.obj -o box.vdb --voxel-size 0.05 --name hull --quiet
-    info_tells box.vdb "grid 'hull'" "class: level set" "voxel size: 0.05 0.05 0.05"
+    info_tells box.vdb "grid 'hull'" "class: level set" "voxel size: 0.05 0.05 0.05" "bounds: 0 0 -0.05 to 1.05 1.05 1.05" "suggested: --ao 0.154  # a twelfth"
     [[ $output != *problem* ]] || fail "a problem"
     info_tells "$ASSETS/seeds.json" "caster 0: sdf" "light 'sun'" "receiver 0: "
 }
@@ -63,11 +64,27 @@ sys.exit("\n".join(one for one in sys.argv[1:] if not eval(one)) or 0)' "${@:2}"
 @test "--json prints the same facts as an object, and an error as ever" {
     "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet -o box.exr
     "$VDBSHADE" voxelize box.obj -o box.vdb --voxel-size 0.05 --quiet
-    json_has box.obj 'root["triangles"] == 12' 'root["meshes"][0]["name"] == "box"' 'root["meshes"][0]["bounds"] == [[0, 0, 0], [1, 1, 1]]'
+    json_has box.obj 'root["suggested"] == {"ao": 0.144, "texels_per_unit": 341, "size": [1024, 1024]}' 'root["triangles"] == 12' 'root["meshes"][0]["name"] == "box"' 'root["meshes"][0]["bounds"] == [[0, 0, 0], [1, 1, 1]]'
     json_has box.exr 'root["size"] == [32, 32]' 'root["channels"][-1]["name"] == "shadow.sun"' '"vdbshade_version" in root["attributes"]'
     json_has box.vdb 'root["grids"][0]["class"] == "level set"' '"box.obj" in root["grids"][0]["attributes"]["vdbshade_input_0"]'
     json_has "$ASSETS/seeds.json" 'root["casters"][0]["type"] == "sdf"' 'root["receivers"][0]["size"] == [512, 512]'
     refuses 3 none.obj -- info none.obj --json
+}
+
+@test "bakes take the suggested options, and --ao auto the suggested distance, in scenes too" {
+    local options
+    cp "$ASSETS/terrain.png" .
+    write_bake ball.json '{"sdf": {"shape": "sphere", "radius": 2}}' '"ao": {"distance": "auto"}' '"plane": {"size": [6, 3]}, "size": 16'
+    sed 's/"plane".*"size": 16/"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 16/; s/ball/hills/' ball.json >hills.json
+    info_tells ball.json "bounds: -3 -2 -2 to 3 2 2" "suggested: --ao 0.687 --texels-per-unit 197" "ao: auto, within 0.687"
+    info_tells hills.json "bounds: -5 -2 -5 to 5 2 5" "--ao 1.2"
+    options=$("$VDBSHADE" info box.obj --size 64 | sed -n 's/^suggested: \(.*\)#.*/\1/p')
+    # shellcheck disable=SC2086 # words
+    succeed bake box.obj $options -o lit.glb
+    succeed_saying "AO within 0.144: a twelfth of the diagonal" -- bake box.obj --ao auto --size 64 -o auto.exr
+    succeed bake box.obj --ao 0.144 --size 64 -o same.exr --quiet
+    same auto.exr same.exr
+    succeed_saying "AO within 0.687" -- bake ball.json
 }
 
 @test "a file with blanks in its name is read in every format" {

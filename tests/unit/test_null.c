@@ -117,7 +117,7 @@ TEST(scenes_need_their_arguments) {
     REFUSED(vsh_flat_scene_set(NULL, "--size", "1", &error));
     REFUSED(vsh_flat_scene_set(&flat, NULL, "1", &error));
     MAKES_NONE(vsh_assets_load(NULL, NULL, PLACE, &error));
-    REFUSED(vsh_assets_load(&scene, NULL, NULL, &error));
+    REFUSED(vsh_assets_load(&set, NULL, NULL, &error));
     MAKES_NONE(vsh_scene_casters(NULL, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_casters(&scene, NULL, NULL, PLACE, &error));
     MAKES_NONE(vsh_scene_occluders(NULL, NULL, NULL, NULL, PLACE, &error));

@@ -189,11 +189,11 @@ TEST(default_transforms_are_the_identity_and_zeroed_ones_are_refused) {
     enum { COUNT = 2 };
     vsh_caster casters[COUNT] = {vsh_caster_default(), vsh_caster_default()};
     vsh_receiver receiver = vsh_receiver_default();
-    const vsh_scene scene = {.casters = casters,
-                             .caster_count = COUNT,
-                             .receivers = &receiver,
-                             .receiver_count = 1,
-                             .grid = vsh_grid_options_default()};
+    vsh_scene scene = {.casters = casters,
+                       .caster_count = COUNT,
+                       .receivers = &receiver,
+                       .receiver_count = 1,
+                       .grid = vsh_grid_options_default()};
     receiver.path = casters[0].path = casters[1].path = VSH_ASSETS "/thin.glb";
     vsh_assets *assets = NULL;
     assert_ok(vsh_assets_load(&scene, NULL, &assets, &failure));

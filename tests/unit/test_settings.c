@@ -26,7 +26,8 @@ TEST(a_setting_goes_where_the_file_would_put_it) {
     assert_true(scene.ambient[0] == 0.0 && scene.ambient[1] == 0.25 && scene.ambient[2] == 1.0);
     assert_true(scene.tint.type == VSH_TINT_POWER && scene.tint.power[2] == 1.5);
     takes(&scene, "irradiance", "false");
-    assert_false(scene.irradiance);
+    takes(&scene, "--ao", "auto");
+    assert_true(!scene.irradiance && scene.ao && scene.shade.ao_distance == 0.0);
 
     vsh_receiver receiver = vsh_receiver_default();
     assert_ok(vsh_receiver_set(&receiver, "--size", "64x32", &failure));

@@ -303,6 +303,7 @@ static int report_bake(const bake_run *b, const vsh_bake_report *report) {
     stats.seconds[CLI_STAGE_BAKE] = report->bake_s;
     stats.seconds[CLI_STAGE_WRITE] = report->write_s;
     cli_stats_casters(&stats, scene, &report->occluders);
+    cli_say_auto_ao(scene, report->ao_distance);
     cli_stats_warn(&stats, scene);
     CLI_TRY(write_view(s, &scene->receivers[0]));
     CLI_TRY(cli_stats_finish(&stats, s->stats));
@@ -326,6 +327,7 @@ static int print_forecast(const bake_run *b, const vsh_bake_options *how, const 
     const vsh_result result = vsh_forecast_scene(b->scene, how, run, &f, &cli_error);
     CLI_TRY(b->code != CLI_OK ? b->code : cli_check_input(result));
     cli_stats stats = {.of = CLI_STATS_TEXELS};
+    cli_say_auto_ao(b->scene, f.ao_distance);
     cli_stats_methods(&stats, b->scene, f.has_triangles);
     printf("methods       %s\n", cli_stats_methods_text(&stats));
     printf("texels        %" PRIu64 " in %zu lightmap%s, %" PRIu64 " samples\n", f.texels, f.lightmap_count,

@@ -413,7 +413,9 @@ int cli_shading_begin(cli_shading *shading, const cli_bake_settings *settings, i
 }
 
 int cli_shading_load(cli_shading *shading) {
+    const vsh_scene given = *shading->scene;
     CLI_TRY(cli_check_input(vsh_assets_load(shading->scene, &cli_run, &shading->assets, &cli_error)));
+    cli_say_auto_ao(&given, shading->scene->shade.ao_distance);
     cli_stats_lap(&shading->stats, CLI_STAGE_LOAD);
     return CLI_OK;
 }

@@ -288,7 +288,7 @@ class Scene(SceneFile, kind="vsh_scene"):
     solidity : mapping, optional
         how meshes cast, by patterns: {"wall*": "shell"}
     **settings
-        by the names of the command line's options (settings()): max_error=0.01, ao_distance=1, width=512. Those of
+        by the names of the command line's options (settings()): max_error=0.01, ao="auto", size=512. Those of
         receivers are of all of them
 
     Examples
@@ -369,6 +369,8 @@ class Scene(SceneFile, kind="vsh_scene"):
 
 class Assets(Handle, kind="vsh_assets"):
     """The contents of a scene's files, each file read once."""
+
+    info: types.AssetsInfo
 
     def __init__(self, scene: Scene, *, run: Optional[Run] = None) -> None:
         super().__init__(call(lib.vsh_assets_load, scene, OUT, run=run))
@@ -672,7 +674,6 @@ class Comparison:
     """
 
     def __init__(self, cdata: Any) -> None:
-        self.alike = bool(lib.vsh_comparison_alike(cdata))
         self.channels: List[types.ChannelComparison] = []
         self.problems: List[str] = []
         while lib.vsh_comparison_channel(cdata, len(self.channels)) != ffi.NULL:
@@ -685,6 +686,7 @@ class Comparison:
             if problem is None:
                 break
             self.problems.append(problem)
+        self.alike: bool = not self.problems and all(channel.alike for channel in self.channels)
 
     def __bool__(self) -> bool:
         return self.alike
