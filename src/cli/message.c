@@ -93,7 +93,7 @@ static void clear_line(void) {
 /* Writes a line, on a terminal one that is shorter than it is wide, with a bar if there is room. */
 static void show_progress(double fraction, double now) {
     static const char full[] = "########################################";
-    enum { WIDEST = sizeof full - 1, LEAST = 8, REST = 46 /* columns of the other text */ };
+    enum { WIDEST = sizeof full - 1, REST = 46 /* columns of the other text */ };
     char rest[32] = "", line[512];
     const double elapsed = now - progress.began, done = fraction - progress.skipped;
     if (elapsed >= estimate_seconds && done >= estimate_fraction && fraction < 1.0) {
@@ -102,9 +102,7 @@ static void show_progress(double fraction, double now) {
                  left >= 100.0 ? "min" : "s");
     }
     const int columns = progress.terminal ? find_columns() - 1 : (int)sizeof line;
-    const int room = !progress.terminal || columns < REST + LEAST ? 0
-                     : columns < REST + WIDEST                    ? columns - REST
-                                                                  : WIDEST;
+    const int room = progress.terminal ? (int)fmin(fmax(columns - REST, 0.0), WIDEST) : 0;
     const int drawn = (int)(room * fmin(fmax(fraction, 0.0), 1.0));
     snprintf(line, sizeof line, "vdbshade: %s%.*s%*s%s%s %.0f %%%s", room > 0 ? "[" : "", drawn, full,
              room - drawn, "", room > 0 ? "] " : "", progress.stage, 100.0 * fraction, rest);

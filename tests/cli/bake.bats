@@ -81,16 +81,15 @@ terminal() {
 }
 
 @test "a terminal shows a bar with percent and time left that fits, and colours unless NO_COLOR or TERM=dumb" {
-    local red=$'\033[31mvdbshade: ' columns
-    export TERM=xterm
+    local -x TERM=xterm columns
     for columns in 100 30; do
         terminal $columns bake "$ASSETS/cloister.glb" --ao 0.6 --max-error 0.005 --size 512 -o out.exr | sed -n 's/^\x1b\[K//; / %/p' >$columns
         awk -v columns=$columns 'length >= columns || /left/ && !begun { exit 1 } { begun = 1 }' $columns || fail "$(cat $columns)"
     done
     grep -qE '^vdbshade: \[##* *\] bake [0-9]+ %, about [0-9]+ s left$' 100 || fail "$(cat 100)"
     grep -q '^vdbshade: bake [0-9]* %, about' 30 || fail "$(cat 30)"
-    [[ $(terminal 100 info none.obj) == "$red"* && $(NO_COLOR=1 terminal 100 info none.obj) == vdbshade* ]] || fail "colours"
-    [[ $(TERM=dumb terminal 100 bake box.obj "${SMALL[@]}" -o out.exr) != *[%$'\033']* ]] || fail "a dumb terminal"
+    [[ $(terminal 100 info none.obj) == $'\033[31mvdbshade: '* && $(NO_COLOR=1 terminal 100 info none.obj) == vdbshade* &&
+        $(TERM=dumb terminal 100 bake box.obj "${SMALL[@]}" -o out.exr) != *[%$'\033']* ]] || fail "colours"
 }
 
 @test "an open mesh, overlapping charts and UVs outside the square are reported with the mesh's name" {
@@ -100,14 +99,16 @@ terminal() {
     [ "$(grep -c 'overlap other' <<<"$stderr")" -eq 0 ] || fail "overlaps are told twice"
 }
 
-@test "a scene's receivers are all baked, and flags override it" {
+@test "a scene's receivers are all baked, flags override it, and those that do not fit it are refused" {
     cat >two.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}, {"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0, 2, 0]}}],
- "ao": {"distance": 1}, "resolution": 24, "lights": [{"name": "lamp", "type": "sphere", "position": [3, 4, 0],
- "radius": 0.3}],
+ "ao": {"distance": 1}, "resolution": 24, "lights": [{"name": "lamp", "type": "sphere", "position": [3, 4, 0], "radius": 0.3}],
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"},
                {"mesh": "box.obj", "size": 16, "output": "b.exr"}]}
 JSON
+    refuses 2 two.json -- bake two.json -o out.exr
+    refuses 2 --sun -- bake two.json --sun 0,1,0
+    [ -z "$(find . -name '*.exr')" ] || fail "something is written"
     succeed bake two.json --size 24 --method smooth --quiet
     cmp a.exr b.exr
     info_tells a.exr "24 × 24, 6 channels" "shadow.lamp"

@@ -72,15 +72,12 @@ sys.exit("\n".join(one for one in sys.argv[1:] if not eval(one)) or 0)' "${@:2}"
 }
 
 @test "bakes take the suggested options, and --ao auto the suggested distance, in scenes too" {
-    local options
-    cp "$ASSETS/terrain.png" .
     write_bake ball.json '{"sdf": {"shape": "sphere", "radius": 2}}' '"ao": {"distance": "auto"}' '"plane": {"size": [6, 3]}, "size": 16'
-    sed 's/"plane".*"size": 16/"heightfield": "terrain.png", "extent": [10, 10], "height": 2, "size": 16/; s/ball/hills/' ball.json >hills.json
+    sed 's|"plane".*"size": 16|"heightfield": "'"$ASSETS"'/terrain.png", "extent": [10, 10], "height": 2|; s/ball/hills/' ball.json >hills.json
     info_tells ball.json "bounds: -3 -2 -2 to 3 2 2" "suggested: --ao 0.687 --texels-per-unit 197" "ao: auto, within 0.687"
     info_tells hills.json "bounds: -5 -2 -5 to 5 2 5" "--ao 1.2"
-    options=$("$VDBSHADE" info box.obj --size 64 | sed -n 's/^suggested: \(.*\)#.*/\1/p')
-    # shellcheck disable=SC2086 # words
-    succeed bake box.obj $options -o lit.glb
+    # shellcheck disable=SC2046 # words
+    succeed bake box.obj $("$VDBSHADE" info box.obj --size 64 | sed -n 's/^suggested: \(.*\)#.*/\1/p') -o lit.glb
     succeed_saying "AO within 0.144: a twelfth of the diagonal" -- bake box.obj --ao auto --size 64 -o auto.exr
     succeed bake box.obj --ao 0.144 --size 64 -o same.exr --quiet
     same auto.exr same.exr

@@ -59,18 +59,6 @@ LIST
     [ ! -e out.webp ]
 }
 
-@test "options that do not fit a scene with two receivers are refused" {
-    cat >two.json <<'JSON'
-{"casters": [{"mesh": "box.obj"}], "ao": {"distance": 1}, "resolution": 24,
- "receivers": [{"mesh": "box.obj", "size": 16, "output": "a.exr"},
-               {"mesh": "box.obj", "size": 16, "output": "b.exr"}]}
-JSON
-    refuses 2 two.json -- bake two.json -o out.exr
-    refuses 2 --sun -- bake two.json --sun 0,1,0
-    untouched out.exr
-    [ ! -e a.exr ] && [ ! -e b.exr ]
-}
-
 @test "files cut short, or of another kind than their name says, end with 3" {
     local one
     for one in exr png tif jpg; do
