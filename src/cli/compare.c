@@ -475,7 +475,7 @@ static const char *verdict(bool alike) {
     return alike ? "<span class=\"good\">alike</span>" : "<span class=\"bad\">not alike</span>";
 }
 
-/* Writes what the page shows, and how many comparisons passed in what time. */
+/* Writes the title, the numbers of passed and failed comparisons, and the time. */
 static void write_summary(FILE *out, const cli_compare_settings *s, const cli_comparison *comparisons,
                           size_t count) {
     const char *title = s->folder != NULL

@@ -15,7 +15,7 @@ typedef struct info_settings {
 static const cli_option options[] = {
     {.help = "Options"},
     {"json", NULL, "print the same facts as one JSON object", CLI_VALUE(FLAG, info_settings, json)},
-    {"size", "W[xH]", "texels of the lightmap that UVs are checked in, and suggestions made for (1024)",
+    {"size", "W[xH]", "texels of the lightmap that UVs are checked in and options suggested for (1024)",
      CLI_VALUE(SIZE, info_settings, size)},
     CLI_VERBOSE_OPTION("a paragraph for each mesh, however many there are"),
     {"unit", CLI_SETTING},
@@ -103,13 +103,12 @@ static void suggest_options(json_t *root, const vsh_assets_info *of, const int32
     }
     json_t *made = add(root, "suggested", json_object());
     state_bounds(root, "", of->bounds_min, of->bounds_max);
-    state(made, "ao", json_real(of->ao_distance), "suggested: --ao %.10g", of->ao_distance);
+    state(made, "ao", json_real(of->ao_distance), "suggested: --ao %.10g%s", of->ao_distance,
+          of->area > 0.0 ? "" : "  # a twelfth of the diagonal\n");
     if (of->area > 0.0) {
         state(made, "texels_per_unit", json_real(density), " --texels-per-unit %.10g", density);
-        state(made, "size", size_of(size[0], size[1]), " --size %dx%d", size[0], size[1]);
-    }
-    if (!as_json) {
-        printf("  # a twelfth of the diagonal%s\n", of->area > 0.0 ? "; charts fill two thirds" : "");
+        state(made, "size", size_of(size[0], size[1]),
+              " --size %dx%d  # a twelfth of the diagonal; charts fill two thirds\n", size[0], size[1]);
     }
 }
 
@@ -240,7 +239,7 @@ static int state_vdb(json_t *root, const char *path, const char *name, const int
     caster.type = VSH_CASTER_VDB;
     caster.path = path;
     caster.grid = name;
-    if (code == CLI_OK) { /* what cannot cast has a problem, or needs none */
+    if (code == CLI_OK) { /* grids that cannot cast state their problem above */
         state_size(root, &(vsh_scene){.casters = &caster, .caster_count = 1}, size);
     }
     return code;
@@ -316,7 +315,7 @@ typedef struct mesh_info {
     const char *path;
     const vsh_model *model;
     size_t count;
-    double scale;                  /* to the unit that was asked for */
+    double scale;                  /* from the file's unit to --unit */
     vsh_mesh *meshes;              /* [count] */
     vsh_mesh_report *checks;       /* [count]: in that unit */
     vsh_solidity_report *solidity; /* [count] */

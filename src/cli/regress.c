@@ -378,6 +378,7 @@ static void print_errors(int from) {
     static const char name[] = "vdbshade: ", warning[] = "vdbshade: warning";
     char line[CLI_LINE];
     FILE *errors = fdopen(from, "r");
+    cli_end_progress(); /* these lines do not clear it */
     rewind(errors);
     while (fgets(line, sizeof line, errors) != NULL) {
         fputs(line, stderr);
