@@ -478,15 +478,12 @@ static const char *verdict(bool alike) {
 /* Writes the title, the numbers of passed and failed comparisons, and the time. */
 static void write_summary(FILE *out, const cli_compare_settings *s, const cli_comparison *comparisons,
                           size_t count) {
-    const char *title = s->folder != NULL
-                            ? cli_keep_text("Bakes of %s", s->folder)
-                            : cli_keep_text("%s and %s", comparisons->golden, comparisons->fresh);
     size_t passed = 0;
     for (size_t i = 0; i < count; ++i) {
         passed += comparisons[i].alike;
     }
-    cli_write(out, "<title>", title, "</title>\n");
-    cli_write(out, "<h1>", title, "</h1>\n<p><b class=\"good\">");
+    cli_write(out, "<title>", s->title, "</title>\n");
+    cli_write(out, "<h1>", s->title, "</h1>\n<p><b class=\"good\">");
     fprintf(out, "%zu passed</b>, <b class=\"%s\">%zu failed</b> in %.1f s</p>\n", passed,
             passed < count ? "bad" : "good", count - passed, vshi_seconds() - s->began);
 }
@@ -588,6 +585,7 @@ static int compare_main(int argc, char **argv) {
     cli_compare_settings s = {.options = vsh_compare_files_options_default(), .began = vshi_seconds()};
     const char *files[2];
     CLI_TRY(cli_parse(&cli_compare, argc, argv, &s, files));
+    s.title = cli_keep_text("%s and %s", files[0], files[1]);
     const char *const reports[] = {s.junit, s.html};
     int code;
     cli_comparison comparison = {.alike = false};

@@ -8,8 +8,8 @@ typedef struct cli_compare_settings {
     bool json; /* on standard output, instead of text */
     bool padding;
     const char *junit, *html;
-    const char *folder; /* of the scenes, whose page it is; NULL: compares two files */
-    double began;       /* seconds */
+    const char *title; /* of the page */
+    double began;      /* seconds */
 } cli_compare_settings;
 
 /* Options of commands whose settings begin with cli_compare_settings; `tolerances` is the help of one. */

@@ -640,7 +640,7 @@ static int regress_main(int argc, char **argv) {
     work.settings.compare.options = vsh_compare_files_options_default();
     work.settings.compare.began = vshi_seconds();
     CLI_TRY(cli_parse(&cli_regress, argc, argv, &work.settings, &work.settings.folder));
-    work.settings.compare.folder = work.settings.folder;
+    work.settings.compare.title = cli_keep_text("Bakes of %s", work.settings.folder);
     const int code = run_cases();
     remove_folder();
     for (size_t i = 0; i < work.case_count; ++i) {
