@@ -4,10 +4,12 @@ blender -b --factory-startup --python tests/blender/test_bake.py -- ADDON VDBSHA
 import importlib.util
 import math
 import os
+import subprocess
 import sys
 import traceback
 
 import bpy
+import numpy
 
 ADDON, PROGRAM, FOLDER = sys.argv[sys.argv.index("--") + 1:]
 
@@ -443,6 +445,37 @@ def test_a_bake_that_is_stopped_leaves_nothing():
     job.stop()
     assert process.poll() is not None and not os.path.exists(folder)
     assert "vdbshade" not in bpy.data.images
+
+
+def test_the_light_of_a_lit_glb_is_shown_as_it_was_baked():
+    floor, roof, _ = start()
+    glb, lit, baked, drawn = (os.path.join(FOLDER, name) for name in ("in.glb", "lit.glb", "baked.exr", "drawn.exr"))
+    sys.modules["vdbshade_bake.scene"].write_glb(glb, [floor, roof], bpy.context.evaluated_depsgraph_get(), {"floor": "Baked"})
+    command = [PROGRAM, "bake", glb, "--receive", "floor", "--sun", "0,0,1", "--sun-angle", "30", "--ao", "3", "--size", "64", "--unwrap", "never"]
+    subprocess.run(command + ["-o", baked, "--pack", "R=shadow.sun,G=ao"], check=True)
+    subprocess.run(command + ["--ambient", "0.5,0.5,0.5", "-o", lit], check=True)
+    start()
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    assert bpy.ops.vdbshade.import_light(filepath=lit) == {"FINISHED"}
+    scene = bpy.context.scene
+    scene.world = bpy.data.worlds.new("white")
+    scene.world.color = (1.0, 1.0, 1.0)  # which adds nothing
+    # the importer takes the file's y for up, and this one has z
+    bpy.ops.object.camera_add(location=(0.0, -0.5, 0.0), rotation=(math.pi / 2.0, 0.0, 0.0))
+    scene.camera, camera = bpy.context.object, bpy.context.object.data
+    camera.type, camera.ortho_scale, camera.clip_start = "ORTHO", 2.0, 0.01
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 1, False
+    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
+    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", drawn
+    bpy.ops.render.render(write_still=True)
+    baked, drawn = (numpy.reshape(bpy.data.images.load(path).pixels, (-1, 4)) for path in (baked, drawn))
+    wanted = (baked[:, :1] + 0.5) * baked[:, 1:2]
+    difference = drawn[:, :3] - wanted
+    print("largest difference %.2f of 255, RMS %.2f" % (255.0 * abs(difference).max(), 255.0 * math.sqrt((difference ** 2).mean())))
+    assert wanted.min() < 0.4 and wanted.max() > 1.4 and abs(difference).max() < 2.0 / 255.0
+    assert "no material has MOZ_lightmap" in error_of(lambda: bpy.ops.vdbshade.import_light(filepath=glb))
 
 
 def test_progress_is_read():

@@ -1,4 +1,5 @@
 """Bakes shadows and ambient occlusion of the selected objects by vdbshade, and puts the image into their materials.
+Imports glTF files with their baked light.
 
 An add-on for Blender 3.4 and later (docs/lit.md). Its panel is in the sidebar of
 the 3D view, tab "vdbshade". The program does the work in a process of its own: Blender can be used meanwhile, and Esc
@@ -15,8 +16,10 @@ bl_info = {
 }
 
 import bpy
+import bpy_extras
 
 from .bake import Bake
+from .lit import import_light
 from .scene import BakeError, is_caster
 
 ERRORS = (BakeError, OSError, RuntimeError)
@@ -98,6 +101,22 @@ class VDBSHADE_OT_bake(bpy.types.Operator):
             context.workspace.status_text_set(None)
 
 
+class VDBSHADE_OT_import_light(bpy.types.Operator, bpy_extras.io_utils.ImportHelper):
+    """Import a glTF or GLB that vdbshade has lit, and show its baked light"""
+    bl_idname = "vdbshade.import_light"
+    bl_label = "Import baked light"
+    bl_options = {"REGISTER", "UNDO"}
+    filter_glob: bpy.props.StringProperty(default="*.glb;*.gltf", options={"HIDDEN"})
+
+    def execute(self, context):
+        try:
+            self.report({"INFO"}, "%d materials show their baked light" % import_light(self.filepath))
+        except ERRORS as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        return {"FINISHED"}
+
+
 # --- settings and panel
 
 
@@ -149,6 +168,7 @@ class VDBSHADE_PT_panel(bpy.types.Panel):
         for name in ("size", "padding", "max_error", "unwrap", "link", "image_name", "pack"):
             layout.prop(settings, name)
         layout.operator("vdbshade.bake", text="Bake %d objects" % sum(map(is_caster, context.selected_objects)))
+        layout.operator("vdbshade.import_light")
 
 
 class VdbshadePreferences(bpy.types.AddonPreferences):
@@ -160,7 +180,7 @@ class VdbshadePreferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "program")
 
 
-CLASSES = (VdbshadeSettings, VDBSHADE_OT_bake, VDBSHADE_PT_panel, VdbshadePreferences)
+CLASSES = (VdbshadeSettings, VDBSHADE_OT_bake, VDBSHADE_OT_import_light, VDBSHADE_PT_panel, VdbshadePreferences)
 
 
 def register():
