@@ -41,7 +41,7 @@ VSHI_SHARED vsh_result vshi_output_commit(vshi_output *output, vsh_error *error)
 /* Commits several outputs in their order: all of them, or after a failure none. (If the file system has no
  * hard links, a failure removes the old files of those before it.) Errors: VSH_ERROR_WRITE, VSH_ERROR_MEMORY.
  */
-vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_error *error);
+VSHI_SHARED vsh_result vshi_outputs_commit(vshi_output *const *outputs, size_t count, vsh_error *error);
 
 /* Removes the temporary, if there is one; the target stays. */
 VSHI_SHARED void vshi_output_abandon(vshi_output *output);

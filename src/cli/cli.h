@@ -168,6 +168,10 @@ typedef struct cli_temporary {
 /* Begins a file that appears whole at commit, or not at all. Write failures show at commit. */
 int cli_temporary_begin(cli_temporary *temporary, const char *target);
 int cli_temporary_commit(cli_temporary *temporary);
+
+/* Commits several files: all of them, or none. */
+enum { CLI_MOST_TEMPORARIES = 2 };
+int cli_temporaries_commit(cli_temporary *const *list, size_t count);
 void cli_temporary_abandon(cli_temporary *temporary);
 
 /* Copies the rest of a file; false with errno if that fails. */

@@ -235,17 +235,26 @@ int cli_temporary_check(const char *target) {
     return code;
 }
 
+int cli_temporaries_commit(cli_temporary *const *list, size_t count) {
+    vshi_output *outputs[CLI_MOST_TEMPORARIES];
+    int code = CLI_OK;
+    for (size_t i = 0; i < count; ++i) {
+        cli_temporary *t = list[i];
+        const bool whole = fflush(t->file) == 0 && !ferror(t->file);
+        if ((fclose(t->file) != 0 || !whole) && code == CLI_OK) {
+            code = fail_writing(t->target);
+        }
+        t->file = NULL;
+        outputs[i] = &t->output;
+    }
+    for (size_t i = 0; i < count && code != CLI_OK; ++i) {
+        vshi_output_abandon(outputs[i]);
+    }
+    return code != CLI_OK ? code : cli_check(vshi_outputs_commit(outputs, count, &cli_error));
+}
+
 int cli_temporary_commit(cli_temporary *t) {
-    int code = fflush(t->file) == 0 && !ferror(t->file) ? CLI_OK : fail_writing(t->target);
-    if (fclose(t->file) != 0 && code == CLI_OK) {
-        code = fail_writing(t->target);
-    }
-    t->file = NULL;
-    if (code != CLI_OK) {
-        vshi_output_abandon(&t->output);
-        return code;
-    }
-    return cli_check(vshi_output_commit(&t->output, &cli_error));
+    return cli_temporaries_commit(&t, 1);
 }
 
 bool cli_copy(FILE *from, FILE *to) {

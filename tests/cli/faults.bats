@@ -100,17 +100,6 @@ LIST
     refused 3 shut/out.exr
 }
 
-@test "the input, a caster and the scene are never replaced" {
-    cp box.obj copy.obj
-    refuses 2 box.obj -- "${BAKE[@]}" box.obj
-    refuses 2 box.obj -- "${BAKE[@]}" ./box.obj
-    ln -s copy.obj link.exr
-    refuses 2 link.exr -- "${BAKE[@]}" link.exr --caster copy.obj
-    refuses 2 box.obj -- "${BAKE[@]}" out.exr --stats box.obj
-    refuses 2 out.exr -- "${BAKE[@]}" out.exr --stats out.exr
-    cmp box.obj copy.obj
-}
-
 @test "the error names ulimit -f if a reader's answer is larger" {
     # 402 vertices with UVs are 8 KB, however they are sent; the lightmap is under 4.
     awk 'BEGIN { for (i = 0; i <= 200; ++i) { x = i / 200; printf "v %g 0 0\nv %g 0 1\nvt %g 0\nvt %g 1\n", x, x, x, x }

@@ -26,12 +26,7 @@ refuse_input() {
         refuses 3 "none.$ending" -- info "none.$ending"
     done
     refuses 3 none.obj -- bake box.obj -o out.exr "${SMALL[@]}" --caster none.obj
-    refuse_each <<'LIST'
-3 none.glb 'cannot be opened' | bake none.glb
-3 none.glb 'cannot be opened' | bake none.glb -o out.exr
-3 none.glb 'cannot be opened' | render none.glb -o out.png
-3 none.glb 'cannot be opened' | volume none.glb -o out.vdb
-LIST
+    refuses 3 none.glb 'cannot be opened' -- bake none.glb
     mkdir folder.obj
     refuse_input 3 folder.obj
     : >empty.obj

@@ -74,6 +74,8 @@ fits() {
 2 '--quiet' | bake box.obj -o out.exr --quiet=yes
 2 other.obj | bake box.obj other.obj -o out.exr --ao 1
 2 'no INPUT' | bake -o out.exr
+2 "--size '64x': expected W or WxH, each from 1 to 65536 texels" | bake box.obj --sun 1,1,1 -o out.exr --size 64x
+2 "--padding '5000': expected a whole number from 0 to 4096" | flat flat.json -o out.exr --padding 5000
 LIST
 }
 
@@ -152,6 +154,10 @@ view box.obj html
 volume box.obj vdb --sun 0,1,0 --resolution 16
 voxelize box.obj vdb --resolution 16
 LIST
+    cp box.obj copy.obj
+    ln -sf copy.obj link.exr
+    refuses 2 link.exr "an input" -- bake box.obj "${SMALL[@]}" -o link.exr --caster copy.obj
+    refuses 2 box.obj "an input" -- bake box.obj "${SMALL[@]}" -o out.exr --stats box.obj
     cmp box.obj <(write_box /dev/stdout) || fail "an input was replaced"
 }
 
@@ -182,17 +188,6 @@ LIST
     write_box ./-box.obj
     succeed bake "${SMALL[@]}" --quiet -o out.exr -- -box.obj
     [ -s out.exr ]
-}
-
-@test "the error of a bad value names option, value and expectation" {
-    refuse_each <<'LIST'
-2 "--rays '5000': expected a whole number from 1 to 4096" | bake box.obj --sun 1,1,1 -o out.exr --rays 5000
-2 "--size '64x': expected W or WxH, each from 1 to 65536 texels" | bake box.obj --sun 1,1,1 -o out.exr --size 64x
-2 "--seams 'stitch': expected one of default, keep, fix" | bake box.obj --sun 1,1,1 -o out.exr --seams stitch
-2 "--method 'soft': expected one of hard," | volume box.obj --sun 1,1,1 -o out.vdb --method soft
-2 "--resolution '1': expected a whole number from 2 to 65536" | query box.obj --points p.csv -o out.csv --resolution 1
-2 "--padding '5000': expected a whole number from 0 to 4096" | flat flat.json -o out.exr --padding 5000
-LIST
 }
 
 # The help of option $1 as one line.

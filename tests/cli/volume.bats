@@ -59,6 +59,10 @@ prepare() {
 2 --band | --band 101
 2 'nearest, off' | --inside maybe
 2 taps | --box 0,3,0,1,4,1 --ao-method taps
+2 'slices.png: the slices of a 3D texture need --box' | -o slices.png
+2 'slices.png: --half is for .vdb and .exr' | -o slices.png --half
+2 'room for 3 grids, not 4' | --box 0,3,0,1,4,1 --max-error 0.1 --error -o slices.png
+2 'scene.json: the output is also an input' | --box 0,3,0,1,4,1 -o scene.raw
 LIST
     refuses 4 '1299 x 1299 x 1299' limit -- volume scene.json -o out.vdb --box -5,-5,-5,5,5,5 --box-voxel-size 0.0077 --memory-limit 2G
     untouched out.vdb
@@ -77,4 +81,16 @@ LIST
     refuses 3 cut.vdb -- volume scene.json -o out.vdb --like cut.vdb
     refuses 2 'ls.vdb: the output is also an input' -- volume scene.json -o ls.vdb --like ls.vdb
     untouched out.vdb
+}
+
+@test "slices of a box have the values of queries at the voxels' centres" {
+    local box=(volume box.obj "${SUN[@]}" --box 0.5,-1,-1,2.5,-0.25,1 --box-voxel-size 0.25 --method cone --quiet)
+    succeed "${box[@]}" -o out.raw
+    python3 -c 'import itertools, struct, sys; sys.stdout.buffer.write(b"".join(
+        struct.pack("<3f", 0.625 + 0.25 * x, 0.25 * y - 0.875, 0.25 * z - 0.875) for z, y, x in itertools.product(range(8), range(3), range(8))))' >points.raw
+    succeed query box.obj "${SUN[@]}" --method cone --points points.raw -o answers.raw --answers-only
+    cmp answers.raw out.raw
+    [ "$(tr -d ' \n' <out.json | cut -d, -f1-11)" = '{"grids":["shadow.sun"],"type":"float32","size":[8,3,8],"box_min":[0.5,-1.0,-1.0],"box_max":[2.5,-0.25,1.0]' ] || fail "$(cat out.json)"
+    succeed "${box[@]}" --ao 1 -o out.exr
+    info_tells out.exr "image: 8 × 24, 3 channels" "'G'"
 }
