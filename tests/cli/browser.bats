@@ -107,10 +107,11 @@ texels_are() {
     done
 }
 
-@test "the page shows each texel of a bake as the file has it" {
+@test "the page shows each texel as the file has it, interpolates them, and shows bent normals as (1 + n) / 2" {
     write_corner
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
     "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=ao,G=shadow.sun,B=0 --bits 8 -o corner.png
+    "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o bent.png
     succeed view corner.obj --planes corner.exr -o corner.html --quiet
     look corner.html "$FRONT&texels=1&mode=ao"
     texels_are corner.png 111 4,10 16,33 28,20 30,60 31,5
@@ -119,6 +120,13 @@ texels_are() {
     texels_are corner.png 222 4,10 16,33 24,20 30,60
     [ "$(picture get corner.png 30 60 | cut -d' ' -f2)" -lt 30 ] || fail "the wall throws no shadow"
     [ "$(picture get corner.png 4 10 | cut -d' ' -f2)" -gt 200 ] || fail "nothing is lit"
+    look corner.html "$FRONT&texels=1&mode=bent"
+    texels_are bent.png 123 4,10 28,20 30,60
+    [ "$(picture get bent.png 30 60 | cut -d' ' -f1)" -lt 120 ] || fail "the wall bends nothing"
+    look corner.html "$FRONT&mode=bent"
+    # pixel 375 is where texels 29 and 30 meet, and 206 where rows 32 and 33 do
+    pixel_is 375 206 $(picture get bent.png 29 32 30 32 29 33 30 33 |
+        awk '{ for (i = 1; i <= 3; ++i) s[i] += $i / 4 } END { print s[1], s[2], s[3] }')
 }
 
 @test "UVs that a packer made integers are shown as they are baked" {
@@ -149,20 +157,6 @@ texels_are() {
     pixel_is 20 20 255 255 255
     look seeds.html "ui=1&$above&pick=0.05,0.05"
     page_has '<h2>surface</h2>' '<th>UV set</th><td>none</td>' '<th>shadow.sun</th><td>1</td>' '<th>ao</th><td>1</td>'
-}
-
-@test "the page interpolates texels bilinearly, and shows bent normals as (1 + n) / 2" {
-    write_corner
-    "$VDBSHADE" bake corner.obj "${BAKE[@]}" -o corner.exr
-    "$VDBSHADE" bake corner.obj "${BAKE[@]}" --pack R=bent.X,G=bent.Y,B=bent.Z --bits 8 -o bent.png
-    succeed view corner.obj --planes corner.exr -o corner.html --quiet
-    look corner.html "$FRONT&texels=1&mode=bent"
-    texels_are bent.png 123 4,10 28,20 30,60
-    [ "$(picture get bent.png 30 60 | cut -d' ' -f1)" -lt 120 ] || fail "the wall bends nothing"
-    look corner.html "$FRONT&mode=bent"
-    # pixel 375 is where texels 29 and 30 meet, and 206 where rows 32 and 33 do
-    pixel_is 375 206 $(picture get bent.png 29 32 30 32 29 33 30 33 |
-        awk '{ for (i = 1; i <= 3; ++i) s[i] += $i / 4 } END { print s[1], s[2], s[3] }')
 }
 
 @test "keys choose the mode, and the mouse turns the view and picks" {
@@ -215,10 +209,11 @@ texels_are() {
 ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     return r.width > 0 && e.contains(document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2)); }'
 
-@test "on a phone buttons are 44 pixels large, the panel covers a third, and Show undoes Hide" {
+@test "labels are whole where there is room; on a phone buttons are 44 pixels large, the panel covers a third, and Show undoes Hide" {
     write_squares
     write_corner
-    succeed view squares.gltf corner.obj -o models.html --quiet
+    mv corner.obj "a corner with a rather long name.obj"
+    succeed view squares.gltf "a corner with a rather long name.obj" -o models.html --quiet
     WIDE=390x844m look models.html "mode=light" \
         "tell:[...document.querySelectorAll('button, select, input[type=range], label:has([type=checkbox])')].map(e => [e.id, e.getBoundingClientRect()])
             .filter(([id, r]) => r.width > 0 && (r.width < 44 || r.height < 44)).map(([id, r]) => id + ' ' + r.width + ' ' + r.height).join()" \
@@ -227,12 +222,6 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
         "tell:document.getElementById('show').click(); String(onTop(document.getElementById('hide')))" >told
     [ "$(sed 2d told)" = $'\nShow\ntrue' ] || fail "small, or not to be shown again: $(cat told)"
     holds "$(sed -n 2p told) > 0.1 && $(sed -n 2p told) <= 1 / 3"
-}
-
-@test "labels are whole where there is room" {
-    write_corner
-    cp corner.obj "a corner with a rather long name.obj"
-    succeed view corner.obj "a corner with a rather long name.obj" -o models.html --quiet
     WIDE=1440x900 look models.html "" \
         "tell:[...document.querySelectorAll('span, label, button, h1')].filter(e => e.scrollWidth > e.clientWidth && e.clientWidth > 0).map(e => e.textContent).join()" \
         "tell:String(document.getElementById('right').clientWidth > 100)" >told
@@ -304,49 +293,6 @@ ON_TOP='const onTop = e => { const r = e.getBoundingClientRect();
     look webp.html ""
     page_has 'texture 1 is not shown: browsers do not read the images of KHR_texture_basisu'
     ! grep -q 'undefined\|texture 0\|image 0' <(grep -o 'id="problems".*' page.dom | head -c 400)
-}
-
-@test "the three.js code of docs/lit.md shows a lit glTF as the page does" {
-    three=/usr/share/javascript/three
-    write_squares
-    sed -i 's/"baseColorFactor"/"metallicFactor": 0, &/g' squares.gltf
-    # the page cannot ask for files: they stand in it
-    sed -i "s|light%20map.png|data:image/png;base64,$(base64 -w0 'light map.png')|; s|ao.png|data:image/png;base64,$(base64 -w0 ao.png)|;
-        s|squares.bin|data:application/octet-stream;base64,$(base64 -w0 squares.bin)|" squares.gltf
-    awk '/^```js$/ { inside = 1; next } /^```$/ { inside = 0 } inside' "$DOCS/lit.md" |
-        sed "s|'lit.glb'|'data:application/json;base64,$(base64 -w0 squares.gltf)'|" >lines.js
-    grep -q 'addLightmaps(THREE, gltf)' lines.js
-    {
-        echo '<!doctype html><html data-state="loading"><style>body { margin: 0 }</style><script>'
-        cat $three/three.min.js
-        echo '</script><script>'
-        cat $three/examples/js/loaders/GLTFLoader.js
-        echo '</script><script>
-            const scene = new THREE.Scene(), camera = new THREE.PerspectiveCamera(90, 1, 0.1, 10);
-            const renderer = new THREE.WebGLRenderer({preserveDrawingBuffer: true});
-            renderer.setSize(innerWidth, innerHeight);
-            document.body.append(renderer.domElement);
-            camera.position.z = 1;
-            const add = scene.add;
-            scene.add = function (object) {
-                object.traverse(mesh => { if (mesh.isMesh) for (const map of [mesh.material.lightMap, mesh.material.aoMap])
-                    map.magFilter = map.minFilter = THREE.NearestFilter, map.needsUpdate = true; });
-                add.call(scene, object);
-                renderer.render(scene, camera);
-                document.documentElement.dataset.state = "ready";
-            };
-            addEventListener("unhandledrejection", event => {
-                document.body.append(event.reason.message); document.documentElement.dataset.state = "failed"; });'
-        cat lines.js
-        echo '</script></html>'
-    } | sed 's|<style>|<body><style>|' >engine.html
-    look engine.html ""
-    # r111 shows linear values
-    plain() { awk -v v="$*" 'BEGIN { split(v, a); for (i = 1; i <= 3; ++i) printf "%.2f ", a[i] * a[i + 3] * a[7] }'; }
-    pixel_is 50 100 $(plain 10 20 30 0.8 0.4 0.2 "$(over_pi 0.75)")
-    pixel_is 150 100 $(plain 60 70 80 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 128 / 255) / 2')")
-    pixel_is 350 100 $(plain 160 170 180 1 1 1 "$(over_pi '200 / 255')")
-    pixel_is 50 300 $(plain 200 210 220 0.8 0.4 0.2 "$(over_pi '0.75 * (1 + 30 / 255) / 2')")
 }
 
 @test "docs/tutorial.md leads from Blender to a lit page, and to shadows in a C program" {

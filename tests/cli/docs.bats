@@ -56,7 +56,7 @@ made() {
 
 @test "every command of the README and of docs/lit.md, docs/pipeline.md and docs/view.md" {
     run_commands lit.md 3
-    made lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr
+    made lit.glb preview.glb lit.gltf lit.bin lit.occlusion.png lit.exr mask.png probes.png
     run_commands pipeline.md 5
     run_commands view.md 11
     made both.html seeds.html view.png court.png baked.png shafts.exr

@@ -288,9 +288,9 @@ write_packed() {
 JSON
 }
 
-# blocks_of KIND FILE: prints the code blocks of a Markdown file that are of this kind.
+# blocks_of KIND FILE [N]: prints the code blocks of a Markdown file that are of this kind, or the Nth alone.
 blocks_of() {
-    awk -v begin="\`\`\`$1" '$1 == begin { inside = 1; next } $1 == "```" { inside = 0 } inside' "$2"
+    awk -v begin="\`\`\`$1" -v only="${3:-0}" '$1 == begin { inside = !only || ++n == only; next } $1 == "```" { inside = 0 } inside' "$2"
 }
 
 # run_commands FILE LEAST: every command of docs/FILE runs; there are LEAST at least. Lines that a backslash ends are continued. The last
