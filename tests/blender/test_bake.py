@@ -455,8 +455,7 @@ def test_the_light_of_a_lit_glb_is_shown_as_it_was_baked():
     subprocess.run(command + ["-o", baked, "--pack", "R=shadow.sun,G=ao"], check=True)
     subprocess.run(command + ["--ambient", "0.5,0.5,0.5", "-o", lit], check=True)
     start()
-    for obj in list(bpy.data.objects):
-        bpy.data.objects.remove(obj)
+    bpy.data.batch_remove(bpy.data.objects)
     assert bpy.ops.vdbshade.import_light(filepath=lit) == {"FINISHED"}
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("white")
@@ -465,9 +464,8 @@ def test_the_light_of_a_lit_glb_is_shown_as_it_was_baked():
     bpy.ops.object.camera_add(location=(0.0, -0.5, 0.0), rotation=(math.pi / 2.0, 0.0, 0.0))
     scene.camera, camera = bpy.context.object, bpy.context.object.data
     camera.type, camera.ortho_scale, camera.clip_start = "ORTHO", 2.0, 0.01
-    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 1, False
-    scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
-    scene.render.resolution_x = scene.render.resolution_y = 64
+    scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.pixel_filter_type, scene.cycles.filter_width = 1, False, "BOX", 0.01
+    scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = "CYCLES", 64, 64
     scene.render.image_settings.file_format, scene.render.filepath = "OPEN_EXR", drawn
     bpy.ops.render.render(write_still=True)
     baked, drawn = (numpy.reshape(bpy.data.images.load(path).pixels, (-1, 4)) for path in (baked, drawn))

@@ -1,10 +1,8 @@
 /* Volumes: their values against closed forms, against queries at the same places, and against a lightmap. */
-#include "testing.h"
-#include "volumes.h"
-
+#include "folder.h"
 #include "previews.h"
 #include "texels_of.h"
-#include <sys/stat.h>
+#include "volumes.h"
 
 static const double TOWARDS[3] = {0.3, 1.0, 0.2};
 
@@ -82,8 +80,6 @@ TEST(ao_of_free_space_is_the_free_share_of_all_directions) {
 }
 
 /* --- the same values as queries */
-
-enum { LIGHTS = 2 };
 
 /* Shadow at places by a query. */
 static float *query_shadow(const vsh_occluders *occluders, const vsh_light *light,
@@ -304,18 +300,6 @@ TEST(casters_without_voxels_hide_light_and_are_solid) {
 
 static const double UP[3] = {0.0, 1.0, 0.0};
 
-static char vdb_path[64];
-
-static int make_file(void **state) {
-    strcpy(vdb_path, "copy-XXXXXX");
-    const int file = mkstemp(vdb_path);
-    return file < 0 || close(file) != 0;
-}
-
-static int remove_file(void **state) {
-    return unlink(vdb_path);
-}
-
 /* --- inside */
 
 /* A renderer that interpolates between voxels sees at a ball's surface what the surface's own points see. It
@@ -326,7 +310,7 @@ static void check_surface(const dense *d, const double towards[3]) {
     for (int i = 0; i < 4000; ++i) {
         double p[3];
         random_direction(&counter, p);
-        const double cosine = (p[0] * towards[0] + p[1] * towards[1] + p[2] * towards[2]) / length3(towards);
+        const double cosine = dot3(p, towards) / length3(towards);
         assert_true(fabs(cosine) < TERMINATOR || sample_dense(d, p) == (cosine > 0.0 ? 1.0f : 0.0f));
     }
 }
@@ -558,11 +542,11 @@ TEST(bad_boxes_bands_and_options_are_refused) {
 TEST(copied_distances_of_a_ball_are_exact_and_active_within_the_band) {
     const double voxel = 0.125, half = 3.0 * voxel;
     OWNED(vsh_grid) *grid = grid_of(ball(), voxel);
-    assert_ok(vsh_grid_write(grid, vdb_path, NULL, NULL, 0, &failure));
+    assert_ok(vsh_grid_write(grid, at("ball.vdb"), NULL, NULL, 0, &failure));
     const int32_t low[3] = {-12, -11, -13}, size[3] = {25, 21, 27}; /* not the same along any two axes */
     const size_t count = (size_t)size[0] * (size_t)size[1] * (size_t)size[2];
     FREED float *values = malloc(count * sizeof *values), *active = malloc(count * sizeof *active);
-    assert_ok(vshi_vdb_copy(vdb_path, "surface", low, size, NULL, values, active, &failure));
+    assert_ok(vshi_vdb_copy(at("ball.vdb"), "surface", low, size, NULL, values, active, &failure));
     size_t within = 0;
     for (size_t i = 0; i < count; ++i) {
         const double x = voxel * (low[0] + (double)(i % 25)), y = voxel * (low[1] + (double)(i / 25 % 21));
@@ -579,10 +563,10 @@ TEST(copied_distances_of_a_ball_are_exact_and_active_within_the_band) {
     /* each alone, and by the first grid's name */
     float one = 7.0f;
     const int32_t middle[3] = {0, 0, 8}, single[3] = {1, 1, 1};
-    assert_ok(vshi_vdb_copy(vdb_path, NULL, middle, single, NULL, &one, NULL, &failure));
+    assert_ok(vshi_vdb_copy(at("ball.vdb"), NULL, middle, single, NULL, &one, NULL, &failure));
     assert_true(fabs((double)one) < 0.02 * voxel);
-    assert_ok(vshi_vdb_copy(vdb_path, NULL, middle, single, NULL, NULL, &one, &failure));
+    assert_ok(vshi_vdb_copy(at("ball.vdb"), NULL, middle, single, NULL, NULL, &one, &failure));
     assert_true(one == 1.0f);
 }
 
-FIXTURE(make_file, remove_file)
+FIXTURE(make_folder, remove_folder)
