@@ -329,7 +329,7 @@ static void record_word(FILE *record, const char *word) {
 /* Records an option if it changes values. */
 static void record_option(FILE *record, const cli_option *option, const char *value) {
     static const char changes_nothing[] =
-        " output output-folder stats threads memory-limit sandbox allow-outside quiet verbose progress json "
+        " output stats threads memory-limit sandbox allow-outside quiet verbose progress json "
         "dry-run help view shard ";
     if (strstr(changes_nothing, cli_keep_text(" %s ", option->name)) != NULL) {
         return;

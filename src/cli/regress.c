@@ -434,7 +434,7 @@ static int bake(const regress_case *one) {
         add_line(&words, one->options.line[i]);
     }
     add_line(&words, one->output != NULL ? cli_keep_text("--output=%s/%s", work.bakes, one->output)
-                                         : cli_keep_text("--output-folder=%s", work.bakes));
+                                         : cli_keep_text("--output=%s/", work.bakes));
     add_line(&words, "--quiet");
     add_line(&words, cli_keep_text("--memory-limit=%" PRIu64, cli_run.memory_limit));
     add_line(&words, cli_keep_text("--sandbox=%s", sandboxes[cli_given.sandbox]));

@@ -158,7 +158,7 @@ receiver() {
         succeed bake box.obj "${SMALL[@]}" --per-object -o "$out" --dry-run
     done
     printf '{"casters": [{"mesh": "box.obj"}], "ao": {"distance": 1}, "receivers": [{"mesh": "box.obj", "size": 32, "output": "lit.glb"}]}' >scene.json
-    succeed bake scene.json --output-folder new --dry-run
+    succeed bake scene.json -o new/ --dry-run
     [ ! -e new ] || fail "it was made"
     # it refuses what a bake refuses
     refuse_each bake --dry-run <<'LIST'

@@ -1,4 +1,4 @@
-# Outputs are complete or the old ones: killed bakes, full disks, bad places, --output-folder.
+# Outputs are complete or the old ones: killed bakes, full disks, bad places, -o FOLDER/.
 load helper
 
 prepare() {
@@ -112,23 +112,23 @@ LIST
     done_well
 }
 
-@test "--output-folder takes all outputs of a scene by their names, and nothing else" {
+@test "-o FOLDER/ takes all outputs of a scene by their names, and nothing else" {
     mkdir -p elsewhere maps
     cat >two.json <<'JSON'
 {"casters": [{"mesh": "box.obj"}], "resolution": 16, "ao": {"distance": 1},
  "receivers": [{"mesh": "box.obj", "size": 16, "output": "maps/one.exr"},
                {"mesh": "box.obj", "size": 8, "output": "two.png"}]}
 JSON
-    succeed bake two.json --output-folder elsewhere --quiet
+    succeed bake two.json -o elsewhere/ --quiet
     [ -s elsewhere/one.exr ] && [ -s elsewhere/two.png ] || fail "not there"
     [ ! -e maps/one.exr ] && [ ! -e two.png ] || fail "in both places"
-    succeed bake two.json --output-folder no/where --quiet
+    succeed bake two.json -o no/where/ --quiet
     [ -s no/where/one.exr ] || fail "the folder was not made"
     refuse_each bake <<'LIST'
-3 box.obj/maps 'cannot be made' | two.json --output-folder box.obj/maps --quiet
+3 box.obj/maps 'cannot be made' | two.json -o box.obj/maps/ --quiet
 3 missing/out.exr "no folder 'missing'" "mkdir -p 'missing'" | box.obj --ao 1 --resolution 16 -o missing/out.exr
-2 --output-folder | box.obj --ao 1 --output-folder elsewhere -o out.exr
+2 'is a folder' | box.obj --ao 1 -o elsewhere/
 LIST
     sed -i 's/two.png/one.exr/' two.json
-    refuses 2 elsewhere/one.exr 'two outputs' -- bake two.json --output-folder elsewhere --quiet
+    refuses 2 elsewhere/one.exr 'two outputs' -- bake two.json -o elsewhere/ --quiet
 }

@@ -149,7 +149,7 @@ asking() {
     local one
     mkdir elsewhere
     for one in "--sandbox off" "--stats $PWD/elsewhere/a" "--stats=$PWD/elsewhere/a" "-o $PWD/elsewhere/a.exr" "-o$PWD/elsewhere/a.exr" \
-        "--output $PWD/elsewhere/a.exr" "--output-folder $PWD/elsewhere" "--invalid $PWD/elsewhere/a.png" --dry-run \
+        "--output $PWD/elsewhere/a.exr" "-o $PWD/elsewhere/" "--invalid $PWD/elsewhere/a.png" --dry-run \
         "--threads 1" "--memory-limit 0" "--sand off" "--per-object" "-- x" "box.json" "--size 8 --sandbox off" "--size=8 --stats elsewhere/a"; do
         # shellcheck disable=SC2086 # words
         asking $one

@@ -117,7 +117,7 @@ cmake -S "$here/../../examples" -B "$work/examples" -DCMAKE_PREFIX_PATH="$prefix
     cp "$here"/../../assets/seeds.json "$here"/../../assets/seeds_floor.obj .
     sed -i 's/"size": 512/"size": 64/' seeds.json
     ./scene seeds.json | tee scene.log && grep -qx 'seeds.exr: 4096 texels' scene.log
-    mkdir program && "$prefix/bin/vdbshade" bake seeds.json --output-folder program --quiet
+    mkdir program && "$prefix/bin/vdbshade" bake seeds.json -o program/ --quiet
     "$prefix/bin/vdbshade" compare seeds.exr program/seeds.exr --max-difference 0 >/dev/null
     # of the sky over a point on the axis the tube hides a ring between two angles, the difference of their sines' squares
     ./callback | tee callback.log && awk '{ open = $NF == "open" ? $(NF - 1) : -1 }

@@ -45,7 +45,7 @@ static const cli_option options[] = {
     {"output", "OUT",
      "image to write: .exr with named channels, or .png .tif .tga .bmp .hdr .ppm .jpg .webp; what each "
      "can hold, and what is not written: docs/formats.md; .glb .gltf .obj: the input with its light in its "
-     "materials (docs/lit.md)",
+     "materials (docs/lit.md); FOLDER/: the outputs that a scene's file names, in that folder, which is made",
      CLI_VALUE(TEXT, cli_bake_settings, output)},
     CLI_SUN_OPTIONS,
     {"ao", CLI_SETTING},
@@ -61,9 +61,6 @@ static const cli_option options[] = {
     {"dry-run", NULL, "bake nothing: print texels, voxels and memory",
      CLI_VALUE(FLAG, cli_bake_settings, dry_run)},
     {.help = "Output"},
-    {"output-folder", "FOLDER",
-     "write the outputs that a scene's file names there, under the same names; the folder is made",
-     CLI_VALUE(TEXT, cli_bake_settings, output_folder)},
     {CLI_SETTINGS(VSH_SETTINGS_IMAGE)},
     {"preview", NULL,
      "into a .glb or .gltf: the light as unlit base colour, which every viewer shows, instead of textures",
@@ -112,7 +109,14 @@ static const cli_option options[] = {
 
 int cli_bake_parse(int argc, char **argv, cli_bake_settings *settings) {
     *settings = (cli_bake_settings){.words = (const char *const *)argv, .word_count = (size_t)argc};
-    return cli_parse(&cli_bake, argc, argv, settings, &settings->input);
+    CLI_TRY(cli_parse(&cli_bake, argc, argv, settings, &settings->input));
+    const size_t length = settings->output != NULL ? strlen(settings->output) : 0;
+    if (length > 0 && settings->output[length - 1] == '/' && !settings->per_object &&
+        cli_has_ending(settings->input, "json")) {
+        settings->output_folder = cli_end_path(settings->output, "");
+        settings->output = NULL;
+    }
+    return CLI_OK;
 }
 
 static int bake_main(int argc, char **argv) {

@@ -55,7 +55,7 @@ int cli_parse_floor(void *at, const char *name, const char *value);
 typedef struct cli_bake_settings {
     const char *input;
     const char *output;
-    const char *output_folder; /* for the outputs that a scene names; NULL: its own folders */
+    const char *output_folder; /* -o FOLDER/, for the outputs that a scene names; NULL: its own folders */
     const char *stats, *invalid_picture, *view, *exr;
     cli_list receive, no_receive, no_cast, casters;
     cli_densities densities;

@@ -138,7 +138,7 @@ static const char *add_object_name(const char *output) {
     return cli_keep_text("%.*s.%s%s", (int)(dot - output), output, OBJECT_NAME, dot);
 }
 
-/* Applies --output-folder and --per-object to a receiver's output. */
+/* Applies the output folder and --per-object to a receiver's output. */
 static const char *place_output(const cli_bake_settings *s, const char *output) {
     if (s->output_folder != NULL) {
         output = cli_keep_text("%s/%s", s->output_folder, cli_file_name(output));
@@ -161,11 +161,8 @@ static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made,
 
 /* Refuses outputs that do not fit the number or kind of receivers. */
 static int check_receivers(const cli_bake_settings *s, const cli_bake_scene *made, size_t receivers) {
-    CLI_REFUSE_IF(s->output_folder != NULL && (s->output != NULL || made->read == NULL),
-                  "--output-folder '%s': %s", s->output_folder,
-                  s->output != NULL ? "there is also -o" : "for the outputs that a scene names");
     CLI_REFUSE_IF(receivers > 1 && s->output != NULL && !(s->per_object && is_of_objects(s->output)),
-                  "-o '%s': %s has %zu receivers with outputs of their own; use --output-folder FOLDER",
+                  "-o '%s': %s has %zu receivers with outputs of their own; use -o FOLDER/",
                   s->output, s->input, receivers);
     CLI_REFUSE_IF(made->read == NULL && cli_has_ending(s->input, "vdb") && s->floor[0] == 0.0,
                   "%s: a level set has no UVs to bake a lightmap by; give --floor W,D,X,Y,Z for a floor "
