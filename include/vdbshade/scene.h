@@ -180,6 +180,9 @@ typedef struct vsh_receiver {
                          texels that it needs, ≤ VSH_MAX_LIGHTMAP_SIZE; 0: pages are `width` × `height` */
     const vsh_density_rule *density; /* [density_count], for new UVs; the last match wins */
     size_t density_count;
+    /* "ao", "irradiance" or "shadow.NAME": instead of lightmaps, the asset gets these values as vertex
+     * colours that fit points on its triangles best; UVs and sizes are not used. NULL: lightmaps */
+    const char *vertex_colors;
 } vsh_receiver;
 
 /* A receiver of type mesh without a file, untransformed. */
@@ -476,6 +479,8 @@ typedef struct vsh_scene_lightmap {
     uint64_t covered;        /* texels with at least one sample; 0 until charts are counted */
     uint64_t samples;        /* evaluated positions, with supersampling; 0 until then */
     uint64_t invalid_texels; /* as in vsh_bake_stats; 0 until it is baked */
+    double vertex_error;     /* of vertex colours, for which texels are points on the triangles: RMSE between
+                                the vertices of the worst mesh; 0 until they are written */
 } vsh_scene_lightmap;
 
 /* Receives `count` rows of a lightmap, from row `first` on: planes[image->channel_count][count][width].
@@ -537,7 +542,8 @@ typedef struct vsh_bake_report {
 
 /* Checks whether the image or asset of receiver `index` can be written, without reading a file. Errors: as
  * vsh_image_check(); VSH_ERROR_ARGUMENT (scene NULL, no such receiver, more than VSH_MAX_CHANNELS; an asset
- * without AO, irradiance and shadows, of 32 bits, or with a pack). */
+ * without AO, irradiance and shadows, of 32 bits, or with a pack; vertex colours of values that the scene
+ * does not have, or of an image). */
 VSH_API vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error);
 
 /* Bakes a scene: loads files, makes occluders, bakes lightmaps tile by tile and writes them. A shard writes a
@@ -605,6 +611,9 @@ typedef struct vsh_lit_mesh {
     uint32_t page; /* without charts */
     /* without uvs: 0 … VSH_MAX_UV_SETS - 1, which the mesh must have; -1: the mesh stays unlit */
     int32_t uv_set;
+    /* without uvs: [vertex_count of the model's mesh][4], RGBA, linear, 65535 is 1: COLOR_0, times the file's
+     * own. NULL: none */
+    const uint16_t *colors;
 } vsh_lit_mesh;
 
 /* Uses of an image in the materials of its page. */
@@ -647,10 +656,11 @@ typedef struct vsh_lit_options {
      * with "vdbshade_"; comments of an .obj */
     const vsh_attribute *attributes;
     size_t attribute_count;
+    int32_t unlit; /* nonzero: materials of meshes with colours get KHR_materials_unlit */
 } vsh_lit_options;
 
 static inline vsh_lit_options vsh_lit_options_default(void) {
-    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, NULL, 0, NULL, 0};
+    vsh_lit_options options = {sizeof(vsh_lit_options), NULL, 0, NULL, 0, NULL, 0, NULL, 0, 0};
     return options;
 }
 
@@ -669,6 +679,9 @@ static inline vsh_lit_options vsh_lit_options_default(void) {
  *
  * Other formats, and a NULL `path`, give a new document: a node for each object with transform, positions,
  * normals, UV sets with the new one as the second, and white materials.
+ *
+ * Vertex colours replace those of an earlier call, which their accessor's name tells. Others become the
+ * attribute _COLOR_0, and COLOR_0 is their product.
  *
  * An .obj holds the meshes in the world, by name, with the UVs that they are lit by. Its images are PREVIEW,
  * beside it, in materials page_N (OUT.mtl).

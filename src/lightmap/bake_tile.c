@@ -490,8 +490,9 @@ static void trace_light(const tracing *t, work *w, size_t tile, size_t index) {
     }
     const vsh_points points = place_points(t, w, light, tracer->traces_shadow);
     const channel c = begin_channel(t, tile, index);
-    vshi_shadow_points(&tracer->shadow[index], &points, w->origins.position, w->values, w->deviation,
-                       c.stats);
+    vshi_shadow_task task = tracer->shadow[index];
+    task.scattered = t->page->charts->points != NULL;
+    vshi_shadow_points(&task, &points, w->origins.position, w->values, w->deviation, c.stats);
     if (tracer->shade.max_error >= VSHI_COARSE) { /* finer values are smooth by themselves */
         smooth_shadow(&tracer->shadow[index].world, &w->origins, w->values, w->deviation, &w->smooth);
     }

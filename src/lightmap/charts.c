@@ -131,25 +131,32 @@ static vsh_result sort_triangles(vshi_charts *charts, bool fill, vshi_job *job, 
 
 /* Sorts the triangles into tiles, and counts outside and degenerate ones. Errors: VSH_ERROR_INPUT,
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
-static vsh_result sort_charts(vshi_charts *charts, const vsh_run *run, vshi_job *job, vsh_uv_report *reports,
+static vsh_result sort_charts(vsh_charts *made, const vsh_run *run, vshi_job *job, vsh_uv_report *reports,
                               vsh_error *error) {
+    vshi_charts *charts = &made->sorted;
     const size_t mesh_count = charts->mesh_count;
-    charts->columns = ((size_t)charts->raster.width + VSHI_TILE - 1) / VSHI_TILE;
-    charts->rows = ((size_t)charts->raster.height + VSHI_TILE - 1) / VSHI_TILE;
-    const size_t tiles = vshi_charts_tiles(charts);
-    /* one more than the starts: filling moves each start on to its end, which is the next one's start */
-    const vshi_array arrays[] = {VSHI_ARRAY(charts->first, mesh_count + 1),
-                                 VSHI_ARRAY(charts->tile_start, tiles + 2)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "tiles", error));
+    const bool points = charts->raster.width == 0;
+    VSHI_TRY(vshi_allocate((void **)&charts->first, mesh_count + 1, sizeof *charts->first, "tiles", error));
     for (size_t m = 0; m < mesh_count; ++m) {
         const vsh_mesh *mesh = &charts->meshes[m];
-        VSHI_TRY(check_uvs(mesh, m, error));
+        VSHI_TRY(points ? VSH_OK : check_uvs(mesh, m, error));
         if (mesh->triangle_count > UINT32_MAX - 1 - charts->first[m]) {
             return vshi_fail(error, VSH_ERROR_LIMIT, "%s: triangle %zu of the receiver, over the limit of %u",
                              vshi_mesh_label(mesh, m).text, charts->first[m] + mesh->triangle_count,
                              UINT32_MAX - 1);
         }
         charts->first[m + 1] = charts->first[m] + mesh->triangle_count;
+    }
+    VSHI_TRY(points ? vshi_points_spread(made, error) : VSH_OK);
+    charts->columns = ((size_t)charts->raster.width + VSHI_TILE - 1) / VSHI_TILE;
+    charts->rows = ((size_t)charts->raster.height + VSHI_TILE - 1) / VSHI_TILE;
+    const size_t tiles = vshi_charts_tiles(charts);
+    /* one more than the starts: filling moves each start on to its end, which is the next one's start */
+    VSHI_TRY(
+        vshi_allocate((void **)&charts->tile_start, tiles + 2, sizeof *charts->tile_start, "tiles", error));
+    if (points) {
+        charts->bytes = (charts->first[mesh_count] + tiles) * sizeof(size_t);
+        return VSH_OK;
     }
     VSHI_TRY(sort_triangles(charts, false, job, reports, error));
     size_t total = 0;
@@ -185,6 +192,11 @@ static vsh_result count_tile(void *user, size_t number, vsh_error *error) {
     const vshi_charts *sorted = &all->charts->sorted;
     const size_t side = (size_t)VSHI_CELL * (size_t)sorted->raster.supersample;
     vshi_tile tile;
+    if (all->charts->points != NULL) {
+        all->charts->samples[number] = vshi_points_in_tile(all->charts, number);
+        atomic_fetch_add(&all->covered, all->charts->samples[number]);
+        return VSH_OK;
+    }
     const vsh_result result = vshi_tile_open(sorted, number, &tile, error);
     for (int32_t k = 0; result == VSH_OK && k < VSHI_TILE_CELLS * VSHI_TILE_CELLS; ++k) {
         if (!vshi_tile_rasterize(sorted, &tile, k % VSHI_TILE_CELLS, k / VSHI_TILE_CELLS, &all->overlaps) ||
@@ -314,7 +326,7 @@ static vsh_result make(vsh_charts *charts, const vsh_run *run, vshi_job *job, vs
     vshi_mesh_set set;
     vsh_result result;
     VSHI_TRY_DONE(vshi_mesh_set_create(sorted->meshes, mesh_count, &set, error));
-    VSHI_TRY_DONE(sort_charts(sorted, run, job, reports, error));
+    VSHI_TRY_DONE(sort_charts(charts, run, job, reports, error));
     VSHI_TRY_DONE(find_sheets(charts, &set, job, run, error));
     find_bounds(charts);
     const size_t tiles = vshi_charts_tiles(sorted), triangles = sorted->first[mesh_count];
@@ -356,6 +368,45 @@ done:
     return result;
 }
 
+vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
+                              vsh_error *error) {
+    vsh_uv_report *reports = NULL;
+    vsh_charts *made = NULL;
+    vshi_job *job = NULL;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_allocate((void **)&reports, mesh_count, sizeof *reports, "UV reports", error));
+    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
+    const size_t columns = (size_t)options->width / VSHI_TILE + 1,
+                 rows = (size_t)options->height / VSHI_TILE + 1;
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "charts", columns * rows, "charts", error));
+    made->info.width = options->width;
+    made->info.height = options->height;
+    VSHI_TRY_DONE(vshi_meshes_tighten(meshes, mesh_count, &made->tight, error));
+    made->sorted.meshes = made->tight.meshes;
+    made->sorted.mesh_count = mesh_count;
+    made->sorted.raster = (vshi_raster){options->width, options->height, options->supersample};
+    made->fills = options->padding == VSH_PADDING_AUTO;
+    made->padding = made->fills ? AUTO_PADDING : options->padding;
+    made->ao_spacing = options->supersample == 1 ? options->ao_spacing : 1;
+    made->tangents = options->tangents != 0;
+    for (size_t m = 0; m < mesh_count; ++m) {
+        made->smooth = made->smooth || meshes[m].normals != NULL;
+    }
+    made->shade = options->shade;
+    VSHI_TRY_DONE(make(made, run, job, reports, error));
+    if (uv_reports != NULL) {
+        memcpy(uv_reports, reports, mesh_count * sizeof *reports);
+    }
+    *charts = made;
+    made = NULL;
+done:
+    vsh_charts_free(made);
+    free(reports);
+    vshi_job_end(job);
+    return result;
+}
+
 vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
                              vsh_error *error) {
@@ -372,45 +423,14 @@ vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vs
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "lightmap of %zu meshes: expected 1 … %d", mesh_count,
                          VSHI_MOST_MESHES);
     }
-    vsh_uv_report *reports = NULL;
-    vsh_charts *made = NULL;
-    vshi_job *job = NULL;
-    vsh_result result;
-    VSHI_TRY_DONE(vshi_allocate((void **)&reports, mesh_count, sizeof *reports, "UV reports", error));
-    VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "texels", error));
-    const size_t columns = (size_t)full.width / VSHI_TILE + 1, rows = (size_t)full.height / VSHI_TILE + 1;
-    VSHI_TRY_DONE(vshi_job_open(&job, &full_run, "charts", columns * rows, "charts", error));
-    made->info.width = full.width;
-    made->info.height = full.height;
-    VSHI_TRY_DONE(vshi_meshes_tighten(meshes, mesh_count, &made->tight, error));
-    made->sorted.meshes = made->tight.meshes;
-    made->sorted.mesh_count = mesh_count;
-    made->sorted.raster = (vshi_raster){full.width, full.height, full.supersample};
-    made->fills = full.padding == VSH_PADDING_AUTO;
-    made->padding = made->fills ? AUTO_PADDING : full.padding;
-    made->ao_spacing = full.supersample == 1 ? full.ao_spacing : 1;
-    made->tangents = full.tangents != 0;
-    for (size_t m = 0; m < mesh_count; ++m) {
-        made->smooth = made->smooth || meshes[m].normals != NULL;
-    }
-    made->shade = full.shade;
-    VSHI_TRY_DONE(make(made, &full_run, job, reports, error));
-    if (uv_reports != NULL) {
-        memcpy(uv_reports, reports, mesh_count * sizeof *reports);
-    }
-    *charts = made;
-    made = NULL;
-done:
-    vsh_charts_free(made);
-    free(reports);
-    vshi_job_end(job);
-    return result;
+    return vshi_charts_create(meshes, mesh_count, &full, &full_run, uv_reports, charts, error);
 }
 
 void vsh_charts_free(vsh_charts *charts) {
     if (charts == NULL) {
         return;
     }
+    free(charts->points);
     free(charts->sheet);
     free(charts->samples);
     free(charts->sorted.tile_triangle);

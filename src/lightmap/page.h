@@ -231,6 +231,21 @@ void vshi_bent_normal(const float *normal, const float *tangent, float *bent);
 /* Makes a mean of bent normals a unit vector. */
 void vshi_bent_normalize(float *bent);
 
+/* --- vertex colours from the points of a page (vertices.c) */
+
+typedef struct vshi_vertex_colors {
+    uint16_t *values; /* [vertices of all meshes][4]: RGBA, linear, 65535 is 1 */
+    double *error;    /* [meshes]: RMSE of the interpolated colours at the mesh's points; 0 without points */
+} vshi_vertex_colors;
+
+/* Fits the colours of all vertices to the points that `coverage` has as valid, for the least squared error
+ * of the interpolated triangles. Vertices with equal positions and normals share a colour. `values` are
+ * [texels][channels] (1 or 3), cut to 0 … 1, as colours are. Free both arrays also after an error. Errors:
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+vsh_result vshi_vertex_colors_fit(const vsh_charts *charts, const float *coverage, const float *values,
+                                  size_t channels, const vsh_run *run, vshi_vertex_colors *colors,
+                                  vsh_error *error);
+
 /* --- errors of values against the casters, measured on some samples (field_error.c) */
 
 /* One channel: a light, or (NULL) AO, or with options->ao_up the sky: the free upper directions, as a share

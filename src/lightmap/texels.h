@@ -95,11 +95,38 @@ struct vsh_charts {
     vsh_shade_options shade;
     uint64_t *samples;    /* [tiles] */
     unsigned char *sheet; /* [triangles of all meshes]: 1: air on both sides, so the field holds its shell */
+    size_t *points;       /* [triangles + 1]: first point of each; NULL: texels lie in UVs (points.c) */
 };
 
 /* Warns of faults in a mesh's UVs, one line for each kind. `file` is the mesh's, or "". */
 void vshi_warn_mesh_uvs(const char *file, const vsh_mesh *mesh, size_t index, const vsh_uv_report *uv,
                         const vsh_run *run);
+
+/* Every second bit of a number of six bits: texels of a cell along Morton's curve (1966). */
+static inline size_t vshi_even_bits(size_t number) {
+    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
+}
+
+/* --- points in place of texels (points.c): cells and tiles of a page take them in their order */
+
+/* Spreads points over the triangles, whose numbers are known, and sets the page's size. Errors:
+ * VSH_ERROR_MEMORY. */
+vsh_result vshi_points_spread(vsh_charts *charts, vsh_error *error);
+uint64_t vshi_points_in_tile(const vsh_charts *charts, size_t tile);
+
+/* vsh_charts_create() with resolved options and run. A width of 0 gives points; then supersample and
+ * ao_spacing are 1, and padding 0. */
+vsh_result vshi_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vsh_lightmap_options *options,
+                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
+                              vsh_error *error);
+
+/* The part of a triangle's world area that each of its points has. */
+double vshi_point_area(const vsh_charts *charts, size_t triangle);
+
+uint32_t vshi_point_texel(const vsh_charts *charts, size_t point);
+
+/* Finds the barycentric weights of a triangle's point. */
+void vshi_point_weights(const vsh_charts *charts, size_t triangle, size_t point, double weight[3]);
 
 /* --- one tile (tile.c) */
 
@@ -177,7 +204,7 @@ typedef struct vshi_sample_writer {
     const vsh_charts *charts;
     const vshi_tile *tile;
     vshi_samples *samples;
-    uint32_t number; /* triangle + 1 that is set up; 0: none */
+    size_t number; /* triangle + 1 that is set up; 0: none */
     vshi_surface surface;
     float tangent[4]; /* of the triangle, if wanted */
 } vshi_sample_writer;

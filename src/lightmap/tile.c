@@ -553,16 +553,16 @@ void vshi_samples_free(vshi_samples *samples) {
     *samples = (vshi_samples){.count = 0};
 }
 
-static void write_sample(vshi_sample_writer *w, uint32_t number, uint32_t texel, const double weight[3],
-                         bool border) {
+/* Writes a sample of triangle `local` of a mesh. Each triangle has a `number` of its own, above 0. */
+static void write_sample(vshi_sample_writer *w, size_t number, size_t mesh_number, size_t local,
+                         uint32_t texel, const double weight[3], bool border) {
     vshi_samples *samples = w->samples;
-    const vshi_uv_triangle *triangle = &w->tile->triangle[number - 1];
     if (number != w->number) {
-        const vsh_mesh *mesh = &w->charts->sorted.meshes[triangle->mesh];
-        vshi_surface_set(mesh, triangle->local, &w->surface);
+        const vsh_mesh *mesh = &w->charts->sorted.meshes[mesh_number];
+        vshi_surface_set(mesh, local, &w->surface);
         if (samples->tangent != NULL) {
             double handedness;
-            vshi_vec_to_floats(vshi_surface_tangent(mesh, triangle->local, &handedness), w->tangent);
+            vshi_vec_to_floats(vshi_surface_tangent(mesh, local, &handedness), w->tangent);
             w->tangent[3] = (float)handedness;
         }
         w->number = number;
@@ -575,10 +575,29 @@ static void write_sample(vshi_sample_writer *w, uint32_t number, uint32_t texel,
     vshi_vec_to_floats(w->surface.geometric, samples->geometric + 3 * i);
     vshi_vec_to_floats(lift, samples->lift + 3 * i);
     samples->texel[i] = texel;
-    const bool sheet = w->charts->sheet[w->charts->sorted.first[triangle->mesh] + triangle->local] != 0;
-    samples->mesh[i] = triangle->mesh | (sheet ? VSHI_SAMPLE_SHEET : 0) | (border ? VSHI_SAMPLE_BORDER : 0);
+    const bool sheet = w->charts->sheet[w->charts->sorted.first[mesh_number] + local] != 0;
+    samples->mesh[i] =
+        (uint32_t)mesh_number | (sheet ? VSHI_SAMPLE_SHEET : 0) | (border ? VSHI_SAMPLE_BORDER : 0);
     if (samples->tangent != NULL) {
         memcpy(samples->tangent + 4 * i, w->tangent, sizeof w->tangent);
+    }
+}
+
+/* Writes the points of rows of cells. A triangle's first point is no neighbour of those of the last. */
+static void write_points(vshi_sample_writer *w, const vshi_tile *tile, int32_t begin, int32_t end) {
+    enum { ROW_POINTS = VSHI_TILE * VSHI_CELL };
+    const vsh_charts *charts = w->charts;
+    const size_t first = (tile->row * charts->sorted.columns + tile->column) * VSHI_TILE * VSHI_TILE;
+    const size_t triangles = charts->sorted.first[charts->sorted.mesh_count];
+    const size_t last = first + (size_t)end * ROW_POINTS;
+    for (size_t p = first + (size_t)begin * ROW_POINTS; p < last && p < charts->info.samples; ++p) {
+        double weight[3];
+        size_t local;
+        const size_t triangle = vshi_find_group(charts->points, triangles, p);
+        const size_t mesh = vshi_charts_mesh(&charts->sorted, triangle, &local);
+        vshi_point_weights(charts, triangle, p, weight);
+        write_sample(w, triangle + 1, mesh, local, vshi_point_texel(charts, p), weight,
+                     p == charts->points[triangle]);
     }
 }
 
@@ -593,7 +612,8 @@ static void write_texel(vshi_sample_writer *w, size_t x, size_t y) {
     if (((cell->border >> bit) & 1) != 0) {
         const uint32_t number = cell->nearest[bit];
         find_centroid_near(&w->tile->triangle[number - 1], (double)column + 0.5, (double)row + 0.5, weight);
-        write_sample(w, number, texel, weight, true);
+        const vshi_uv_triangle *nearest = &w->tile->triangle[number - 1];
+        write_sample(w, number, nearest->mesh, nearest->local, texel, weight, true);
         return;
     }
     for (size_t s = 0; ((cell->covered >> bit) & 1) != 0 && s < n * n; ++s) {
@@ -602,21 +622,17 @@ static void write_texel(vshi_sample_writer *w, size_t x, size_t y) {
         if (number != 0) {
             find_barycentric(&w->tile->triangle[number - 1], (double)column + ((double)sx + 0.5) / (double)n,
                              (double)row + ((double)sy + 0.5) / (double)n, weight);
-            write_sample(w, number, texel, weight, false);
+            const vshi_uv_triangle *owner = &w->tile->triangle[number - 1];
+            write_sample(w, number, owner->mesh, owner->local, texel, weight, false);
         }
     }
-}
-
-/* Every second bit of a number of six bits. */
-static size_t even_bits(size_t number) {
-    return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
 }
 
 /* Appends the samples of the last rasterised cell's texels in `mask`, along Morton's curve (1966), so that 4,
  * 16 or all 64 texels that follow each other are a square. */
 static void write_cell(vshi_sample_writer *w, uint64_t mask) {
     for (size_t place = 0; place < (size_t)VSHI_CELL * VSHI_CELL; ++place) {
-        const size_t x = even_bits(place), y = even_bits(place >> 1);
+        const size_t x = vshi_even_bits(place), y = vshi_even_bits(place >> 1);
         if ((mask >> (VSHI_CELL * y + x) & 1) != 0) {
             write_texel(w, x, y);
         }
@@ -624,6 +640,10 @@ static void write_cell(vshi_sample_writer *w, uint64_t mask) {
 }
 
 void vshi_samples_write_rows(vshi_sample_writer *w, vshi_tile *tile, int32_t begin, int32_t end) {
+    if (w->charts->points != NULL) {
+        write_points(w, tile, begin, end);
+        return;
+    }
     for (int32_t y = begin; y < end; ++y) {
         for (int32_t x = 0; x < VSHI_TILE_CELLS; ++x) {
             if (vshi_tile_rasterize(&w->charts->sorted, tile, x, y, NULL)) {

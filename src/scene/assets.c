@@ -232,7 +232,7 @@ static vsh_result select_uvs(const vsh_model *model, const vsh_receiver *receive
     }
     const size_t count = vsh_model_mesh_count(model);
     bool any = false;
-    if (vshi_receiver_unwrap(receiver) != VSH_RECEIVER_UNWRAP_NEVER) {
+    if (vshi_receiver_unwrap(receiver) != VSH_RECEIVER_UNWRAP_NEVER || receiver->vertex_colors != NULL) {
         return VSH_OK;
     }
     for (size_t i = 0; i < count; ++i) {

@@ -47,6 +47,22 @@ static vsh_result check_asset(const vsh_scene *scene, const vsh_receiver *receiv
     return vshi_output_check(receiver->output, error);
 }
 
+static vsh_result check_vertex_colors(const vsh_scene *scene, const vsh_receiver *receiver,
+                                      vsh_error *error) {
+    const char *what = receiver->vertex_colors;
+    bool known =
+        (scene->ao && strcmp(what, "ao") == 0) || (scene->light_count > 0 && strcmp(what, "irradiance") == 0);
+    for (size_t i = 0; i < scene->light_count && !known; ++i) {
+        known = strncmp(what, "shadow.", 7) == 0 && strcmp(what + 7, scene->lights[i].name) == 0;
+    }
+    return known && vsh_lit_is_output(receiver->output)
+               ? VSH_OK
+               : vshi_fail(error, VSH_ERROR_ARGUMENT,
+                           "%s: vertex colours '%.64s': expected ao (with --ao), irradiance (with lights) or "
+                           "shadow.NAME of a light, into a .glb, .gltf or .obj",
+                           receiver->output, what);
+}
+
 static vsh_result check_image(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error) {
     const vsh_image_options options = vshi_receiver_image(receiver);
     vsh_error why;
@@ -64,6 +80,7 @@ vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *e
     VSHI_TRY(check_index(scene, index, error));
     const vsh_receiver *receiver = &scene->receivers[index];
     vshi_channels channels;
+    VSHI_TRY(receiver->vertex_colors != NULL ? check_vertex_colors(scene, receiver, error) : VSH_OK);
     vsh_result result = vshi_channels_name(scene, receiver->width, receiver->height, &channels, error);
     if (result == VSH_OK) {
         result = vsh_lit_is_output(receiver->output) ? check_asset(scene, receiver, error)
@@ -190,6 +207,7 @@ static vsh_result create_charts(const vsh_scene *scene, vshi_target *target, boo
                                 vsh_error *error) {
     const vsh_receiver *receiver = &target->receiver;
     vsh_scene_lightmap *lightmap = target->lightmap;
+    const bool points = receiver->vertex_colors != NULL;
     vsh_lightmap_options options = vsh_lightmap_options_default();
     options.width = receiver->width;
     options.height = receiver->height;
@@ -201,20 +219,27 @@ static vsh_result create_charts(const vsh_scene *scene, vshi_target *target, boo
     options.ao_spacing = scene->ao || vshi_planes_shaded(&scene->planes) > 0 ? receiver->ao_spacing : 1;
     options.shade = scene->shade;
     options.tangents = scene->bent == VSH_BENT_TANGENT;
+    if (points) {
+        options.width = options.padding = options.tangents = 0;
+        options.supersample = options.ao_spacing = 1;
+    }
     vsh_run silent = *run;
     silent.warning = NULL; /* vshi_warn_uvs() names the file, too */
     vsh_charts_info info;
     vsh_uv_report *reports = NULL;
     VSHI_TRY(
         vshi_allocate((void **)&reports, lightmap->mesh_count + 1, sizeof *reports, receiver->path, error));
-    vsh_result result = vsh_charts_create(lightmap->meshes, lightmap->mesh_count, &options, &silent, reports,
-                                          &target->charts, error);
+    vsh_result result = (points ? vshi_charts_create : vsh_charts_create)(
+        lightmap->meshes, lightmap->mesh_count, &options, &silent, reports, &target->charts, error);
     VSHI_TRY_DONE(vshi_name_file(receiver->path, result, error));
     vsh_charts_get_info(target->charts, &info);
     lightmap->covered = info.covered;
     lightmap->samples = info.samples;
     VSHI_TRY_DONE(vshi_refuse_uvs(target, reports, info.covered, error));
-    if (warns) {
+    if (points) {
+        lightmap->width = target->receiver.width = info.width;
+        lightmap->height = target->receiver.height = info.height;
+    } else if (warns) {
         vshi_warn_uvs(target, reports, info.covered, run);
     }
 done:
@@ -417,7 +442,8 @@ static vsh_result keep_without_memory(const vshi_scene_page *page, vsh_result re
 }
 
 static bool fixes_seams(const vsh_receiver *receiver) {
-    return receiver->seams == VSH_SEAMS_FIX && receiver->type == VSH_RECEIVER_MESH;
+    return receiver->seams == VSH_SEAMS_FIX && receiver->type == VSH_RECEIVER_MESH &&
+           receiver->vertex_colors == NULL;
 }
 
 static vsh_result finish_page(vshi_page_group *g, vshi_scene_page *page, vsh_error *error) {

@@ -224,5 +224,10 @@ void vshi_find_lit_objects(const vshi_scene_page *page);
 /* Warns of lights, and of the sky, that reach no texel, or one object of several. */
 void vshi_warn_lights(const vshi_scene_bake *bake, const vsh_run *run);
 
+/* Warns of meshes whose triangles are too large for the light on them: their errors[meshes] are above `most`.
+ * Returns the largest. */
+double vshi_warn_vertex_colors(const vshi_target *target, const double *errors, double most,
+                               const vsh_run *run);
+
 /* Warns of light that the file's integers cut. */
 void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const vsh_run *run);

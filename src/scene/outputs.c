@@ -405,6 +405,7 @@ typedef struct asset {
     vsh_lit_image *images;
     const char **names; /* [page_count] */
     uint32_t *chart_pages;
+    const vshi_vertex_colors *colors; /* NULL: images */
     vsh_lit_options options;
 } asset;
 
@@ -417,6 +418,11 @@ static vsh_result list_meshes(asset *a, const char *output, vsh_error *error) {
     for (size_t i = 0; i < all; ++i) {
         a->meshes[i].uv_set = -1;
     }
+    const uint16_t *next = a->colors != NULL ? a->colors->values : NULL;
+    for (size_t i = 0; next != NULL && i < place->count; ++i) {
+        a->meshes[place->numbers[i]].colors = next;
+        next += 4 * place->meshes[i].vertex_count;
+    }
     for (size_t page = 0; page < a->page_count; ++page) {
         size_t first, count;
         vshi_place_page(place, page, &first, &count);
@@ -424,8 +430,8 @@ static vsh_result list_meshes(asset *a, const char *output, vsh_error *error) {
             vsh_lit_mesh *mesh = &a->meshes[place->numbers[i]];
             if (atlas != NULL) {
                 const vsh_atlas_mesh v = vsh_atlas_mesh_view(atlas, place->pages.atlas_numbers[i]);
-                *mesh = (vsh_lit_mesh){v.uvs,          v.sources,        v.indices, v.charts,
-                                       v.vertex_count, v.triangle_count, 0,         0};
+                *mesh = (vsh_lit_mesh){
+                    v.uvs, v.sources, v.indices, v.charts, v.vertex_count, v.triangle_count, 0, 0, NULL};
                 continue;
             }
             mesh->page = (uint32_t)page;
@@ -482,9 +488,9 @@ static vsh_result list_images(asset *a, const char *output, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Writes a receiver's asset from its pages. */
+/* Writes a receiver's asset from its pages, or from the colours of its vertices. */
 static vsh_result write_asset(const vshi_scene_bake *bake, size_t index, const vshi_lit_page *pages,
-                              vsh_error *error) {
+                              const vshi_vertex_colors *colors, vsh_error *error) {
     const vsh_receiver *receiver = &bake->scene.receivers[index];
     const char *output = receiver->output;
     const char *path = receiver->type == VSH_RECEIVER_MESH ? receiver->path : NULL;
@@ -492,7 +498,8 @@ static vsh_result write_asset(const vshi_scene_bake *bake, size_t index, const v
     asset a = {.bake = bake,
                .receiver = index,
                .pages = pages,
-               .page_count = place->pages.count,
+               .page_count = pages != NULL ? place->pages.count : 0,
+               .colors = colors,
                .model = place->made != NULL ? place->made : place->model,
                .options = vsh_lit_options_default()};
     vsh_run run = bake->run;
@@ -500,6 +507,8 @@ static vsh_result write_asset(const vshi_scene_bake *bake, size_t index, const v
     vsh_result result;
     VSHI_TRY_DONE(list_images(&a, output, error));
     VSHI_TRY_DONE(list_meshes(&a, output, error));
+    a.options.unlit = colors != NULL &&
+                      (bake->options.lit_preview != 0 || strcmp(receiver->vertex_colors, "irradiance") == 0);
     a.options.page_names = a.names;
     a.options.page_count = a.page_count;
     a.options.attributes = vsh_provenance_attributes(bake->provenance, &a.options.attribute_count);
@@ -512,11 +521,41 @@ done:
     return result;
 }
 
+/* Errors between vertices, times max_error, that the noise of points does not reach. */
+static const double LARGE = 5.0;
+
+/* Fits vertex colours to a page of points, and writes the asset. */
+static vsh_result write_vertex_colors(const vshi_scene_page *page, vsh_error *error) {
+    const vshi_scene_bake *bake = page->bake;
+    vsh_scene_lightmap *lightmap = page->target->lightmap;
+    const vsh_lightmap *planes = &page->channels.lightmap;
+    const char *what = page->target->receiver.vertex_colors;
+    const bool irradiance = strcmp(what, "irradiance") == 0;
+    const float *values = irradiance ? planes->irradiance : planes->ao;
+    for (size_t i = 0; i < bake->scene.light_count; ++i) {
+        values = strcmp(what, page->channels.names[i]) == 0 ? planes->shadow[i] : values;
+    }
+    vshi_vertex_colors colors;
+    vsh_result result;
+    VSHI_TRY_DONE(vshi_vertex_colors_fit(page->target->charts, planes->coverage, values, irradiance ? 3 : 1,
+                                         &bake->run, &colors, error));
+    lightmap->vertex_error =
+        vshi_warn_vertex_colors(page->target, colors.error, LARGE * bake->scene.shade.max_error, &bake->run);
+    result = write_asset(bake, lightmap->receiver, NULL, &colors, error);
+done:
+    free(colors.values);
+    free(colors.error);
+    return result;
+}
+
 /* Keeps a page for its asset, and writes the asset with the last one. */
 static vsh_result keep_lit_page(const vshi_scene_page *page, vsh_error *error) {
     vshi_scene_bake *bake = page->bake;
     const vsh_scene_lightmap *lightmap = page->target->lightmap;
     const size_t pages = vshi_assets_receiver(bake->assets, lightmap->receiver)->pages.count;
+    if (page->target->receiver.vertex_colors != NULL) {
+        return write_vertex_colors(page, error);
+    }
     if (lightmap->page == 0) {
         vshi_lit_pages_free(bake);
         VSHI_TRY(vshi_allocate((void **)&bake->lit_pages, pages, sizeof *bake->lit_pages, lightmap->output,
@@ -526,7 +565,7 @@ static vsh_result keep_lit_page(const vshi_scene_page *page, vsh_error *error) {
     if (bake->lit_page_count < pages) {
         return VSH_OK;
     }
-    const vsh_result result = write_asset(bake, lightmap->receiver, bake->lit_pages, error);
+    const vsh_result result = write_asset(bake, lightmap->receiver, bake->lit_pages, NULL, error);
     vshi_lit_pages_free(bake);
     return result;
 }

@@ -16,7 +16,7 @@
 static const double LARGEST_DEGENERATE = 0.01;
 
 int32_t vshi_receiver_unwrap(const vsh_receiver *receiver) {
-    if (receiver->type != VSH_RECEIVER_MESH) {
+    if (receiver->type != VSH_RECEIVER_MESH || receiver->vertex_colors != NULL) {
         return VSH_RECEIVER_UNWRAP_NEVER;
     }
     if (receiver->unwrap != VSH_RECEIVER_UNWRAP_DEFAULT) {
@@ -248,7 +248,7 @@ done:
 /* Lists the pages of a receiver that is not unwrapped. */
 static vsh_result keep_pages(vshi_asset_place *place, const vsh_receiver *receiver, vsh_error *error) {
     vshi_receiver_pages *pages = &place->pages;
-    const bool objects = receiver->atlas == VSH_ATLAS_OBJECTS;
+    const bool objects = receiver->atlas == VSH_ATLAS_OBJECTS && receiver->vertex_colors == NULL;
     const vshi_array arrays[] = {VSHI_ARRAY(pages->begins, place->count + 1),
                                  VSHI_ARRAY(pages->list, place->count)};
     VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "pages", error));

@@ -187,6 +187,25 @@ void vshi_warn_clipping(const char *output, const vsh_image_clipping *cut, const
     }
 }
 
+double vshi_warn_vertex_colors(const vshi_target *target, const double *errors, double most,
+                               const vsh_run *run) {
+    const vsh_scene_lightmap *lightmap = target->lightmap;
+    size_t worst = 0, count = 0;
+    for (size_t m = 0; m < lightmap->mesh_count; ++m) {
+        count += errors[m] > most;
+        worst = errors[m] > errors[worst] ? m : worst;
+    }
+    if (count > 0) {
+        vshi_warn(
+            run,
+            "%s: triangles of %zu of %zu meshes are too large for the light on them; mesh '%s' is %.2g off "
+            "(RMSE); subdivide it, or bake a lightmap",
+            lightmap->output, count, lightmap->mesh_count, find_object(&lightmap->meshes[worst]),
+            errors[worst]);
+    }
+    return errors[worst];
+}
+
 /* --- lights that objects hide: a sky dome hides the sun, a bulb its own lamp */
 
 static bool is_same(const vsh_mesh *a, const vsh_mesh *b) {

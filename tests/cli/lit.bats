@@ -34,6 +34,8 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
         succeed bake "$MODELS/$model" "${BAKE[@]}" -o lit.glb --preview
         show_gltf lit.glb text | grep -q '"KHR_materials_unlit":{}' || fail "$model: no preview"
     done
+    succeed bake "$MODELS/scene_draco.glb" --sun 0.4,0.8,0.3 --vertex-colors irradiance -o lit.glb
+    show_gltf lit.glb text | grep '"COLOR_0"' | grep -v KHR_draco | grep -q '"KHR_materials_unlit":{}' || fail "no colours"
     succeed bake box.obj "${BAKE[@]}" -o lit.glb
     show_gltf lit.glb text | grep -q '"TEXCOORD_0"' || fail "no UVs"
 }
@@ -50,6 +52,9 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     refuses 2 a.glb pack -- bake in.glb "${BAKE[@]}" --pack R=ao -o a.glb
     refuses 2 in.glb "the output is also an input" -- bake in.glb "${BAKE[@]}" -o in.glb
     refuses 2 a.glb AO -- bake in.glb --sky y --size 32 -o a.glb
+    refuses 2 a.png "vertex colours 'ao'" -- bake in.glb --ao 1 --vertex-colors ao -o a.png
+    refuses 2 a.glb "vertex colours 'shadow.moon'" -- bake in.glb --sun 0,1,0 --vertex-colors shadow.moon -o a.glb
+    refuses 2 --size -- bake in.glb --ao 1 --vertex-colors ao --size 8 -o a.glb
     [ "$(files)" = in.glb ] || fail "$(files)"
 }
 

@@ -213,7 +213,8 @@ static vsh_result light_asset(const char *name, bool split_them, const vsh_run *
          .height = 2,
          .channels = planes,
          .channel_count = 1}};
-    const vsh_lit_mesh split = {uvs, sources, indices, charts, CORNERS, 2, 0, -1}, meshes[] = {split, split};
+    const vsh_lit_mesh split = {uvs, sources, indices, charts, CORNERS, 2, 0, -1, NULL},
+                       meshes[] = {split, split};
     vsh_lit_options options = vsh_lit_options_default();
     options.images = baked;
     options.image_count = 2;

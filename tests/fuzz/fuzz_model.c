@@ -40,7 +40,7 @@ static void light(const char *path, const vsh_model *model, const vsh_run *run) 
     for (size_t i = 0; i < count; ++i) { /* each corner is a copy of the vertex that it indexes */
         const vsh_mesh mesh = vsh_model_mesh(model, i, 0);
         meshes[i] = (vsh_lit_mesh){
-            uvs, mesh.indices, indices, charts, 3 * mesh.triangle_count, mesh.triangle_count, 0, -1};
+            uvs, mesh.indices, indices, charts, 3 * mesh.triangle_count, mesh.triangle_count, 0, -1, NULL};
     }
     char output[1024];
     snprintf(output, sizeof output, "%s/lit.glb", fuzz_folder());

@@ -7,7 +7,7 @@ import unittest
 import numpy
 
 import vdbshade
-from common import ASSETS, FLOOR, FLOOR_TRIANGLES, FLOOR_UVS, VDBSHADE, Case, box, floor, points_on_floor, sun
+from common import ASSETS, BOX, BOX_TRIANGLES, FLOOR, FLOOR_TRIANGLES, FLOOR_UVS, VDBSHADE, Case, box, floor, points_on_floor, sun
 
 LIT = dict(direction=(0.6, 0.75, 0.5), angle=numpy.radians(3.0))
 
@@ -44,6 +44,43 @@ class Values(Case):
         lit = vdbshade.image_read(self.folder / "py.exr")
         self.assertIn("shadow.sun", lit)
         self.assertIn("vdbshade_input_0", lit.attributes)
+
+    def test_vertex_colours_fit_the_surface_better_than_values_at_its_vertices(self):
+        side = 9  # with a vertex in the box
+        ground = numpy.array([[x / 2 - 2, 0, z / 2 - 2] for x in range(side) for z in range(side)])
+        cells = numpy.array([side * x + z for x in range(side - 1) for z in range(side - 1)])
+        triangles = numpy.concatenate([cells[:, None] + [0, side + 1, side], cells[:, None] + [0, 1, side + 1]])
+        meshes = {"ground": (ground, triangles), "box": (BOX - [0, 0.5, 0], BOX_TRIANGLES)}
+        for name, (places, corners) in meshes.items():
+            lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in places] + [f"f {a} {b} {c}" for a, b, c in corners + 1]
+            (self.folder / f"{name}.obj").write_text("\n".join(lines))
+        bakes = []
+        for threads in (1, 2):
+            ground_receives = dict(path=self.folder / "ground.obj", output=self.folder / "lit.gltf", vertex_colors="ao")
+            scene = vdbshade.Scene(casters=[self.folder / f"{name}.obj" for name in meshes], ao=1.0, receivers=[ground_receives])
+            vdbshade.bake_scene(scene, run=vdbshade.Run(threads=threads))
+            bakes.append((self.folder / "lit.bin").read_bytes())
+        self.assertEqual(*bakes)
+        root = json.loads((self.folder / "lit.gltf").read_text())
+
+        def read(name, kind, size):
+            accessor = root["accessors"][root["meshes"][0]["primitives"][0]["attributes"][name]]
+            offset = root["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
+            return numpy.frombuffer(bakes[0], kind, accessor["count"] * size, offset).reshape(-1, size)
+        fitted, (x, _, z) = numpy.zeros((side, side)), (2 * read("POSITION", "<f4", 3).T + 4).astype(int)
+        fitted[x, z] = read("COLOR_0", "<u2", 4)[:, 0] / 65535
+        occluders = vdbshade.Occluders([vdbshade.Mesh(numpy.float32(places), numpy.uint32(corners)) for places, corners in meshes.values()])
+        ao = lambda places: vdbshade.shade_ao(occluders, places, numpy.tile(numpy.float32([0, 1, 0]), (len(places), 1)), ao_distance=1.0)
+        at = points_on_floor(4000)[0]
+        at = at[numpy.abs(at[:, ::2]).max(axis=1) > 0.5]
+        (i, j), (u, v) = (2 * at[:, ::2].T + 4).astype(int), (2 * at[:, ::2].T + 4) % 1
+
+        def error(values):
+            first, last = values[i, j], values[i + 1, j + 1]
+            beyond, before = values[i + 1, j], values[i, j + 1]
+            shown = numpy.where(u > v, first + u * (beyond - first) + v * (last - beyond), first + v * (before - first) + u * (last - before))
+            return numpy.sqrt(numpy.mean((shown - ao(at)) ** 2))
+        self.assertLess(error(fitted), 0.3 * error(ao(ground).reshape(side, side)))
 
     def test_light_comes_through_what_is_cut_out_or_seen_from_its_back(self):
         sheet, up = FLOOR + numpy.float32([0, 1, 0]), sun(direction=(0, 1, 0), angle=0.01)

@@ -162,8 +162,8 @@ static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made,
 /* Refuses outputs that do not fit the number or kind of receivers. */
 static int check_receivers(const cli_bake_settings *s, const cli_bake_scene *made, size_t receivers) {
     CLI_REFUSE_IF(receivers > 1 && s->output != NULL && !(s->per_object && is_of_objects(s->output)),
-                  "-o '%s': %s has %zu receivers with outputs of their own; use -o FOLDER/",
-                  s->output, s->input, receivers);
+                  "-o '%s': %s has %zu receivers with outputs of their own; use -o FOLDER/", s->output,
+                  s->input, receivers);
     CLI_REFUSE_IF(made->read == NULL && cli_has_ending(s->input, "vdb") && s->floor[0] == 0.0,
                   "%s: a level set has no UVs to bake a lightmap by; give --floor W,D,X,Y,Z for a floor "
                   "that receives, or bake voxels with 'vdbshade volume'",

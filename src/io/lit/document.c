@@ -308,6 +308,19 @@ vsh_result vshi_lit_add_floats(vshi_lit_work *work, const float *values, size_t 
     return VSH_OK;
 }
 
+vsh_result vshi_lit_add_colors(vshi_lit_work *work, const void *values, size_t count, size_t *accessor,
+                               vsh_error *error) {
+    size_t size, view = 0;
+    if (__builtin_mul_overflow(count, (size_t)VSHI_LIT_COLOR_BYTES, &size)) {
+        return vshi_lit_fail_memory(work, error);
+    }
+    VSHI_TRY(vshi_lit_add_view(work, values, size, VSHI_LIT_VERTICES, 0, &view, error));
+    json_t *made = append_accessor(work, view, VSHI_GLTF_USHORT, count, 4, accessor);
+    vshi_lit_set(work, made, "normalized", json_true());
+    vshi_lit_set(work, made, "name", json_string(VSHI_LIT_COLORS));
+    return VSH_OK;
+}
+
 vsh_result vshi_lit_add_indices(vshi_lit_work *work, const uint32_t *indices, size_t count,
                                 size_t vertex_count, size_t *accessor, vsh_error *error) {
     /* some interfaces restart strips at 65535 (glTF 2.0, 3.7.2.1) */

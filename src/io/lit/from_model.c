@@ -213,13 +213,20 @@ static vsh_result add_pages(maker *m, size_t entry, arrays *a, json_t *made, jso
     if (corners.set != SIZE_MAX) {
         return vshi_lit_make_pages(work, made, &corners, &a->indices, list, error);
     }
+    if (lit.colors != NULL) {
+        size_t accessor;
+        VSHI_TRY(vshi_lit_add_colors(work, lit.colors, mesh->vertex_count, &accessor, error));
+        vshi_lit_set_number(work, json_object_get(made, "attributes"), "COLOR_0", accessor);
+    }
     if (a->indices == SIZE_MAX) {
         VSHI_TRY(vshi_lit_add_indices(work, corners.list, 3 * mesh->triangle_count, corners.vertex_count,
                                       &a->indices, error));
     }
     vshi_lit_set_number(work, made, "indices", a->indices);
     vshi_lit_push(work, list, json_incref(made));
-    return VSH_OK;
+    return lit.colors != NULL
+               ? vshi_lit_mark_primitive(work, made, (uint32_t)work->page_count, 0, NULL, error)
+               : VSH_OK;
 }
 
 static vsh_result add_primitive(maker *m, size_t entry, const double *world, json_t *list, vsh_error *error) {

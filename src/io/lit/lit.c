@@ -258,10 +258,10 @@ static vsh_result check_output(const vshi_lit_work *work, vsh_error *error) {
 
 /* --- making the document */
 
-/* Only meshes with new UVs need Draco's data. */
-static bool has_new_uvs(const vshi_lit_work *work) {
+/* Only meshes with new UVs or colours need Draco's data. */
+static bool has_new_values(const vshi_lit_work *work) {
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
-        if (work->meshes[i].uvs != NULL) {
+        if (work->meshes[i].uvs != NULL || work->meshes[i].colors != NULL) {
             return true;
         }
     }
@@ -279,7 +279,7 @@ static vsh_result make_document(vshi_lit_work *work, vsh_error *error) {
         return obj ? VSH_OK : vshi_lit_from_model(work, error);
     }
     VSHI_TRY(vshi_lit_open(work, error));
-    if (has_new_uvs(work)) {
+    if (has_new_values(work)) {
         VSHI_TRY(vshi_lit_read_dracos(work, error));
     }
     VSHI_TRY(vshi_lit_check_materials(work, error));
@@ -290,10 +290,11 @@ static vsh_result write_all(vshi_lit_work *work, vsh_error *error) {
     vshi_lit_besides besides = {NULL, 0};
     const bool glb = strcasecmp(vshi_path_ending(work->output), "glb") == 0;
     vsh_result result;
-    VSHI_TRY_DONE(vshi_check_limit(work->gltf.run, (double)work->page_count * sizeof *work->pages,
+    VSHI_TRY_DONE(vshi_check_limit(work->gltf.run, (double)(work->page_count + 1) * sizeof *work->pages,
                                    work->output, error));
     VSHI_TRY_DONE(
-        vshi_allocate((void **)&work->pages, work->page_count, sizeof *work->pages, "pages", error));
+        vshi_allocate((void **)&work->pages, work->page_count + 1, sizeof *work->pages, "pages", error));
+    work->pages[work->page_count].unlit = work->options->unlit != 0;
     VSHI_TRY_DONE(make_document(work, error));
     VSHI_TRY_DONE(vshi_lit_add_images(work, glb, &besides, error));
     if (!vshi_lit_is_obj(work->output)) {

@@ -338,7 +338,8 @@ static vsh_result set_material(vshi_lit_work *work, json_t *owner, void *user, v
 
 static bool has_images(const vshi_lit_work *work, uint32_t page) {
     const size_t *textures = work->pages[page].textures;
-    return textures[VSH_LIT_OCCLUSION] > 0 || textures[VSH_LIT_LIGHTMAP] > 0 || textures[VSH_LIT_PREVIEW] > 0;
+    return work->pages[page].unlit || textures[VSH_LIT_OCCLUSION] > 0 || textures[VSH_LIT_LIGHTMAP] > 0 ||
+           textures[VSH_LIT_PREVIEW] > 0;
 }
 
 static json_t *make_texture_info(const vshi_lit_work *work, int purpose, const vshi_lit_look *look) {
@@ -374,6 +375,11 @@ static vsh_result set_textures(vshi_lit_work *work, json_t *material, const vshi
         VSHI_TRY(vshi_lit_find_object(work, material, "pbrMetallicRoughness", &base, error));
         VSHI_TRY(vshi_lit_find_object(work, material, "extensions", &extensions, error));
         vshi_lit_set(work, base, "baseColorTexture", make_texture_info(work, VSH_LIT_PREVIEW, look));
+        vshi_lit_set(work, extensions, "KHR_materials_unlit", json_object());
+        vshi_lit_use_extension(work, "KHR_materials_unlit");
+    }
+    if (page->unlit) {
+        VSHI_TRY(vshi_lit_find_object(work, material, "extensions", &extensions, error));
         vshi_lit_set(work, extensions, "KHR_materials_unlit", json_object());
         vshi_lit_use_extension(work, "KHR_materials_unlit");
     }

@@ -13,7 +13,7 @@ typedef struct use {
     size_t instance;     /* SIZE_MAX: the node has none */
     size_t first, count; /* entries */
     bool lit;            /* some primitives are lit */
-    bool keeps;          /* no primitive gets new UVs */
+    bool keeps;          /* no primitive gets new UVs or colours */
     size_t made;         /* the mesh that it shows in the end */
 } use;
 
@@ -85,8 +85,9 @@ static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_erro
         }
         VSHI_TRY(check_entry(work, e, last, error));
         ++last->count;
-        last->lit = last->lit || work->meshes[e].uvs != NULL || work->meshes[e].uv_set >= 0;
-        last->keeps = last->keeps && work->meshes[e].uvs == NULL;
+        const vsh_lit_mesh *mesh = &work->meshes[e];
+        last->lit = last->lit || mesh->uvs != NULL || mesh->uv_set >= 0 || mesh->colors != NULL;
+        last->keeps = last->keeps && mesh->uvs == NULL && mesh->colors == NULL;
     }
     return VSH_OK;
 }

@@ -426,6 +426,9 @@ static vsh_result copy_accessors(const primitive *p, size_t split, json_t *attri
 }
 
 bool vshi_lit_is_split_alike(const vsh_lit_mesh *a, const vsh_lit_mesh *b) {
+    if (a->sources == NULL || b->sources == NULL) { /* colours keep the vertices */
+        return a->sources == b->sources;
+    }
     return a->vertex_count == b->vertex_count && a->triangle_count == b->triangle_count &&
            memcmp(a->sources, b->sources, a->vertex_count * sizeof *a->sources) == 0 &&
            memcmp(a->indices, b->indices, a->triangle_count * 3 * sizeof *a->indices) == 0;
@@ -443,8 +446,16 @@ static vsh_result find_split_alike(const primitive *p, size_t *split, vsh_error 
     }
     VSHI_TRY(vshi_make_room((void **)&work->splits.list, work->splits.count, &work->splits.room,
                             sizeof *work->splits.list, work->gltf.path, error));
-    work->splits.list[work->splits.count++] = (vshi_lit_split){p->mesh, p->index, p->lit, SIZE_MAX};
+    work->splits.list[work->splits.count++] =
+        (vshi_lit_split){p->mesh, p->index, &work->meshes[p->entry], SIZE_MAX};
     return VSH_OK;
+}
+
+/* Adds an accessor of UVs, or of colours; zeros if `values` is NULL. */
+static vsh_result add_values(const primitive *p, const void *values, size_t count, size_t *accessor,
+                             vsh_error *error) {
+    return p->lit->colors != NULL ? vshi_lit_add_colors(p->work, values, count, accessor, error)
+                                  : vshi_lit_add_floats(p->work, values, count, 2, false, accessor, error);
 }
 
 static vsh_result make_split(primitive *p, size_t *uvs, size_t *split, vsh_error *error) {
@@ -456,7 +467,7 @@ static vsh_result make_split(primitive *p, size_t *uvs, size_t *split, vsh_error
         VSHI_TRY(copy_accessors(p, *split, target, true, error));
     }
     vshi_lit_remove_extension(p->made, "KHR_draco_mesh_compression");
-    return vshi_lit_add_floats(p->work, p->uvs[0], p->lit->vertex_count, 2, false, uvs, error);
+    return add_values(p, p->uvs[0], p->lit->vertex_count, uvs, error);
 }
 
 /* --- new UVs for vertices that stay */
@@ -466,7 +477,8 @@ static unsigned char *find_uv(const primitive *p, const vshi_lit_uvs *uvs, size_
 }
 
 static bool can_share(const primitive *p, const vshi_lit_uvs *uvs, size_t positions) {
-    bool good = uvs->positions == positions && uvs->count == p->element_count;
+    bool good = uvs->positions == positions && uvs->count == p->element_count &&
+                uvs->colors == (p->lit->colors != NULL);
     for (size_t i = 0; i < p->lit->vertex_count && good; ++i) {
         good = !uvs->set[p->chosen[i]] || memcmp(find_uv(p, uvs, i), p->uvs[i], sizeof p->uvs[i]) == 0;
     }
@@ -486,11 +498,13 @@ static vsh_result share_uvs(const primitive *p, size_t *accessor, vsh_error *err
         VSHI_TRY(vshi_make_room((void **)&work->uvs.list, work->uvs.count, &work->uvs.room,
                                 sizeof *work->uvs.list, work->gltf.path, error));
         vshi_lit_uvs *made = &work->uvs.list[found];
-        *made =
-            (vshi_lit_uvs){.positions = positions, .count = p->element_count, .offset = work->added.count};
+        *made = (vshi_lit_uvs){.positions = positions,
+                               .count = p->element_count,
+                               .offset = work->added.count,
+                               .colors = p->lit->colors != NULL};
         VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&made->set, made->count, sizeof *made->set, error));
         ++work->uvs.count;
-        VSHI_TRY(vshi_lit_add_floats(work, NULL, made->count, 2, false, &made->accessor, error));
+        VSHI_TRY(add_values(p, NULL, made->count, &made->accessor, error));
     }
     const vshi_lit_uvs *uvs = &work->uvs.list[found];
     for (size_t i = 0; i < p->lit->vertex_count; ++i) {
@@ -499,6 +513,80 @@ static vsh_result share_uvs(const primitive *p, size_t *accessor, vsh_error *err
     }
     *accessor = uvs->accessor;
     return VSH_OK;
+}
+
+/* --- vertex colours */
+
+_Static_assert(sizeof(float[2]) == VSHI_LIT_COLOR_BYTES, "UVs and colours share arrays");
+
+/* Multiplies the colours of the vertices by the file's own: those that an earlier bake kept, or COLOR_0
+ * unless a bake made it. *own: their attribute, or NULL. Errors: as vsh_model_read(). */
+static vsh_result multiply_colors(const primitive *p, const char **own, vsh_error *error) {
+    vshi_gltf *gltf = &p->work->gltf;
+    const json_t *attributes = json_object_get(p->given, "attributes");
+    vshi_gltf_accessor found;
+    unsigned char *dense = NULL;
+    float *values = NULL;
+    size_t index;
+    vsh_result result;
+    *own = json_object_get(attributes, "_COLOR_0") != NULL ? "_COLOR_0" : "COLOR_0";
+    VSHI_TRY(vshi_gltf_index(gltf, attributes, *own, "accessors", p->where, &index, error));
+    const char *maker =
+        json_string_value(json_object_get(vshi_gltf_element(gltf, "accessors", index), "name"));
+    if (index == SIZE_MAX || (maker != NULL && strcmp(maker, VSHI_LIT_COLORS) == 0)) {
+        *own = NULL;
+        return VSH_OK;
+    }
+    const vshi_lit_draco_attribute *draco =
+        p->draco != NULL ? vshi_lit_find_draco_attribute(p->draco, p->given, *own) : NULL;
+    VSHI_TRY_DONE(open_elements(p, index, draco, &found, &dense, error));
+    found.count = p->element_count;
+    const size_t width = (size_t)found.components;
+    VSHI_TRY_DONE(vshi_gltf_allocate(gltf, (void **)&values, found.count * width, sizeof *values, error));
+    vshi_gltf_accessor_floats(&found, values);
+    for (size_t i = 0; i < 4 * p->lit->vertex_count; ++i) {
+        uint16_t *color = (uint16_t *)p->uvs + i;
+        const float factor = i % 4 < width ? values[width * p->elements[i / 4] + i % 4] : 1.0f;
+        *color = (uint16_t)(*color * (factor > 0.0f ? factor < 1.0f ? factor : 1.0f : 0.0f) + 0.5f);
+    }
+done:
+    free(values);
+    free(dense);
+    return result;
+}
+
+/* Makes a primitive with vertex colours. */
+static vsh_result make_colored(primitive *p, json_t *list, vsh_error *error) {
+    static const char name[] = "COLOR_0";
+    vshi_lit_work *work = p->work;
+    const vsh_mesh mesh = vsh_model_mesh(work->model, p->entry, 0);
+    const vshi_array arrays[] = {VSHI_ARRAY(p->chosen, mesh.vertex_count),
+                                 VSHI_ARRAY(p->uvs, mesh.vertex_count)};
+    const char *own;
+    json_t *attributes = json_object_get(p->made, "attributes");
+    vsh_lit_mesh lit = *p->lit;
+    size_t colors, split = 0;
+    lit.vertex_count = mesh.vertex_count;
+    lit.triangle_count = mesh.triangle_count;
+    lit.page = (uint32_t)work->page_count;
+    p->lit = &lit;
+    VSHI_TRY(find_elements(p, error));
+    VSHI_TRY(VSHI_LIT_ALLOCATE(work, arrays, error));
+    memcpy(p->chosen, p->elements, mesh.vertex_count * sizeof *p->chosen);
+    memcpy(p->uvs, lit.colors, mesh.vertex_count * sizeof *p->uvs);
+    VSHI_TRY(multiply_colors(p, &own, error));
+    VSHI_TRY(p->draco != NULL ? make_split(p, &colors, &split, error) : share_uvs(p, &colors, error));
+    if (own != NULL && strcmp(own, name) == 0) { /* for the next bake */
+        vshi_lit_set(work, attributes, "_COLOR_0", json_incref(json_object_get(attributes, name)));
+    }
+    vshi_lit_set_number(work, attributes, name, colors);
+    if (p->draco != NULL) {
+        json_object_del(p->made, "mode");
+        const vshi_lit_corners corners = {&lit, mesh.indices, mesh.vertex_count, 0};
+        return vshi_lit_make_pages(work, p->made, &corners, &work->splits.list[split].indices, list, error);
+    }
+    vshi_lit_push(work, list, json_incref(p->made));
+    return vshi_lit_mark_primitive(work, p->made, lit.page, 0, NULL, error);
 }
 
 /* --- the result */
@@ -572,7 +660,7 @@ vsh_result vshi_lit_make_primitive(vshi_lit_work *work, size_t mesh, size_t inde
     p.made = vshi_lit_copy_json(work, p.given);
     VSHI_TRY_DONE(work->refused ? vshi_lit_fail_memory(work, error) : VSH_OK);
     if (p.lit->uvs == NULL) {
-        result = make_kept(&p, list, error);
+        result = p.lit->colors != NULL ? make_colored(&p, list, error) : make_kept(&p, list, error);
         goto done;
     }
     VSHI_TRY_DONE(find_vertices(&p, error));

@@ -57,14 +57,15 @@ typedef struct vshi_lit_copy {
     size_t split, from, to;
 } vshi_lit_copy;
 
-/* A new UV set of primitives that keep their vertices. It has the full length of the accessor of positions,
- * so primitives with the same positions share it if their UVs agree. */
+/* A new UV set, or vertex colours, of primitives that keep their vertices. It has the full length of the
+ * accessor of positions, so primitives with the same positions share it if their UVs agree. */
 typedef struct vshi_lit_uvs {
     size_t positions; /* accessor */
     size_t count;     /* elements */
     size_t accessor;
     size_t offset; /* its values begin here in the added bytes */
     bool *set;     /* [count] */
+    bool colors;   /* vertex colours, which take as many bytes */
 } vshi_lit_uvs;
 
 enum { VSHI_LIT_PURPOSES = 3 }; /* of vsh_lit_purpose */
@@ -73,6 +74,7 @@ enum { VSHI_LIT_PURPOSES = 3 }; /* of vsh_lit_purpose */
 typedef struct vshi_lit_page_images {
     size_t textures[VSHI_LIT_PURPOSES]; /* 1 + the texture of each purpose; 0: none */
     double intensity;                   /* of the lightmap */
+    bool unlit;                         /* vertex colours alone light it */
 } vshi_lit_page_images;
 
 typedef struct vshi_lit_work {
@@ -81,7 +83,7 @@ typedef struct vshi_lit_work {
     const vsh_lit_mesh *meshes; /* [entries of the model] */
     const vsh_lit_options *options;
     const char *output;
-    vshi_lit_page_images *pages; /* [page_count] */
+    vshi_lit_page_images *pages; /* [page_count + 1]: the last is that of vertex colours */
     size_t page_count;           /* 1 + the highest page */
     vshi_gltf gltf;              /* arrays of its root only grow until it is written */
     char *text;         /* of the file, with the binary chunk; NULL: the document is made of the model */
@@ -191,6 +193,15 @@ vsh_result vshi_lit_add_view(vshi_lit_work *work, const void *bytes, size_t size
  * `bounds`: sets its least and largest values. Errors: as vshi_lit_add_view(). */
 vsh_result vshi_lit_add_floats(vshi_lit_work *work, const float *values, size_t count, int components,
                                bool bounds, size_t *accessor, vsh_error *error);
+
+/* Adds an accessor of vertex colours, VSHI_LIT_COLOR_BYTES each (RGBA, normalized shorts), zeros if `values`
+ * is NULL. Errors: as vshi_lit_add_view(). */
+enum { VSHI_LIT_COLOR_BYTES = 4 * sizeof(uint16_t) };
+vsh_result vshi_lit_add_colors(vshi_lit_work *work, const void *values, size_t count, size_t *accessor,
+                               vsh_error *error);
+
+/* The name of these accessors, by which the next bake knows them. */
+#define VSHI_LIT_COLORS "vdbshade_vertex_colors"
 
 /* Sets an accessor's least and largest values. */
 void vshi_lit_set_bounds(vshi_lit_work *work, json_t *accessor, const vshi_gltf_accessor *values);

@@ -1,6 +1,7 @@
 /* A lit document, or an OBJ, written into its files. */
 #define _GNU_SOURCE /* fopencookie */
 #include "base/decimal.h"
+#include "base/elementary.h"
 #include "base/file.h"
 #include "base/text.h"
 #include "base/vec.h"
@@ -480,9 +481,9 @@ typedef struct obj_mesh {
 
 static void open_mesh(const vshi_lit_work *work, size_t index, obj_mesh *m) {
     const vsh_lit_mesh *lit = m->lit = &work->meshes[index];
-    const bool made = lit->uvs != NULL;
-    m->mesh = vsh_model_mesh(work->model, index, made ? 0 : lit->uv_set);
-    m->uvs = made ? lit->uvs : lit->uv_set >= 0 ? m->mesh.uvs : NULL;
+    const bool made = lit->uvs != NULL, colored = lit->colors != NULL; /* keeps the UVs of textures */
+    m->mesh = vsh_model_mesh(work->model, index, made || colored ? 0 : lit->uv_set);
+    m->uvs = made ? lit->uvs : colored || lit->uv_set >= 0 ? m->mesh.uvs : NULL;
     m->indices = made ? lit->indices : m->mesh.indices;
     m->sources = made ? lit->sources : NULL;
     m->uv_count = made ? lit->vertex_count : m->uvs != NULL ? m->mesh.vertex_count : 0;
@@ -508,7 +509,12 @@ static void write_vertices(FILE *to, const obj_mesh *m) {
     const vsh_mesh *mesh = &m->mesh;
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
         const vshi_vec at = vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * v));
-        fprintf(to, "v %.9g %.9g %.9g\n", at.x, at.y, at.z);
+        const uint16_t *color = m->lit->colors != NULL ? m->lit->colors + 4 * v : NULL;
+        fprintf(to, "v %.9g %.9g %.9g", at.x, at.y, at.z);
+        for (int c = 0; color != NULL && c < 3; ++c) { /* sRGB, as Blender and MeshLab take them */
+            fprintf(to, " %.5g", vshi_to_srgb(color[c] / 65535.0));
+        }
+        fputc('\n', to);
     }
     for (size_t v = 0; v < m->uv_count; ++v) {
         fprintf(to, "vt %.9g %.9g\n", (double)m->uvs[2 * v], (double)m->uvs[2 * v + 1]);
