@@ -33,6 +33,13 @@ VSHI_SHARED vsh_result vshi_fail_memory(vsh_error *error, const char *what);
         }                                                                                                    \
     } while (0)
 
+/* Does the same for the place of a result, and sets the result to NULL. */
+#define VSHI_MAKES(place)                                                                                    \
+    do {                                                                                                     \
+        VSHI_NEEDS(place);                                                                                   \
+        *(place) = NULL;                                                                                     \
+    } while (0)
+
 /* Does the same for an array, which may be NULL if `count` is 0. */
 #define VSHI_NEEDS_OF(count, array)                                                                          \
     do {                                                                                                     \

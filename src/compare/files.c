@@ -126,8 +126,7 @@ static vsh_result read_tolerances(vshi_json *reader, const vshi_value *root, voi
 
 vsh_result vshi_tolerances_read(const char *path, vshi_tolerances **tolerances, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(tolerances);
-    *tolerances = NULL;
+    VSHI_MAKES(tolerances);
     VSHI_NEEDS(path);
     vsh_run run = vsh_run_default();
     run.memory_limit = MOST_TOLERANCE_BYTES;
@@ -642,8 +641,7 @@ static vsh_result compare(files *f, vsh_error *error) {
 vsh_result vsh_compare_files(const char *golden, const char *fresh, const vsh_compare_files_options *options,
                              const vsh_run *run, vsh_comparison **comparison, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(comparison);
-    *comparison = NULL;
+    VSHI_MAKES(comparison);
     VSHI_NEEDS(golden);
     VSHI_NEEDS(fresh);
     files f = {.path = {golden, fresh}, .options = vsh_compare_files_options_default()};

@@ -88,8 +88,7 @@ static vsh_result derive_levels(vsh_field *f, double reach, double held, const v
 vsh_result vshi_field_create(const vsh_grid *grid, const vshi_field_options *options, const vsh_run *run,
                              vsh_field **field, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(field);
-    *field = NULL;
+    VSHI_MAKES(field);
     VSHI_NEEDS(grid);
     vshi_field_options o = vshi_field_options_default();
     vsh_run r;

@@ -42,8 +42,7 @@ vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness, c
                                  vsh_error *error) {
     VSHI_FLOATS;
     static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    VSHI_NEEDS(grid);
-    *grid = NULL;
+    VSHI_MAKES(grid);
     VSHI_NEEDS(outline);
     if (!(thickness > 0.0 && thickness <= VSHI_OUTLINE_LARGEST)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,

@@ -178,19 +178,13 @@ static void bend(const estimating *s, const block *b, const vshi_window_estimate
 static void estimate(const estimating *s, const block *b, const uint16_t *places, size_t count,
                      vshi_window_estimate *estimates) {
     const double max_error = s->shade->max_error;
-    uint16_t unsure[INNER];
-    size_t of[INNER], unsure_count = 0;
-    vshi_window_estimate own[INNER];
     vshi_windows_estimate(&b->windows, places, count, max_error, 0, estimates);
     for (size_t k = 0; k < count; ++k) {
-        if (!(estimates[k].centred <= VSHI_AO_TILE_ENOUGH * max_error)) {
-            unsure[unsure_count] = places[k];
-            of[unsure_count++] = k;
+        if (!(estimates[k].centred <= VSHI_AO_TILE_ENOUGH * max_error)) { /* few */
+            vshi_window_estimate own;
+            vshi_windows_estimate(&b->windows, &places[k], 1, max_error, VSHI_CELL, &own);
+            estimates[k] = own.centred < estimates[k].centred ? own : estimates[k];
         }
-    }
-    vshi_windows_estimate(&b->windows, unsure, unsure_count, max_error, VSHI_CELL, own);
-    for (size_t k = 0; k < unsure_count; ++k) {
-        estimates[of[k]] = own[k].centred < estimates[of[k]].centred ? own[k] : estimates[of[k]];
     }
 }
 

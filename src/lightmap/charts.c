@@ -411,8 +411,7 @@ vsh_result vsh_charts_create(const vsh_mesh *meshes, size_t mesh_count, const vs
                              const vsh_run *run, vsh_uv_report *uv_reports, vsh_charts **charts,
                              vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(charts);
-    *charts = NULL;
+    VSHI_MAKES(charts);
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full_run;
     VSHI_TRY(vshi_run_resolve(run, &full_run, error));

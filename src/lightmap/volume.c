@@ -748,8 +748,7 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
                            size_t light_count, const vsh_volume_options *options, const vsh_run *run,
                            vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(volume);
-    *volume = NULL;
+    VSHI_MAKES(volume);
     VSHI_NEEDS(occluders);
     VSHI_NEEDS(voxels);
     VSHI_NEEDS_OF(light_count, lights);

@@ -172,13 +172,19 @@ static vsh_result gather_caster(assembly *a, size_t i, vsh_error *error) {
     return VSH_OK;
 }
 
-vsh_assets_info vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets) {
+vsh_result vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets, vsh_assets_info *info,
+                              vsh_error *error) {
     assembly a = {.low = {INFINITY, INFINITY, INFINITY}, .high = {-INFINITY, -INFINITY, -INFINITY}};
     double most = 0.0;
     for (size_t i = 0; i < scene->caster_count; ++i) {
         const vsh_caster *c = &scene->casters[i];
-        const bool tree = c->type == VSH_CASTER_SDF && vshi_sdf_check(&c->sdf, NULL) == VSH_OK;
-        grow_by_caster(&a, c, vshi_assets_caster(assets, i), tree ? &c->sdf : NULL, c->transform);
+        const bool tree = c->type == VSH_CASTER_SDF;
+        const vsh_result result = tree ? vshi_sdf_check(&c->sdf, error) : VSH_OK;
+        if (result == VSH_ERROR_MEMORY) { /* check_caster() names the other errors */
+            return result;
+        }
+        grow_by_caster(&a, c, vshi_assets_caster(assets, i), tree && result == VSH_OK ? &c->sdf : NULL,
+                       c->transform);
     }
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         const vshi_asset_place *place = vshi_assets_receiver(assets, i);
@@ -189,9 +195,9 @@ vsh_assets_info vshi_scene_measure(const vsh_scene *scene, const vsh_assets *ass
         }
         most = fmax(most, area);
     }
-    vsh_assets_info info = {{a.low.x, a.low.y, a.low.z}, {a.high.x, a.high.y, a.high.z}, most, 0.0};
-    info.ao_distance = vshi_auto_ao_distance(info.bounds_min, info.bounds_max);
-    return info;
+    *info = (vsh_assets_info){{a.low.x, a.low.y, a.low.z}, {a.high.x, a.high.y, a.high.z}, most, 0.0};
+    info->ao_distance = vshi_auto_ao_distance(info->bounds_min, info->bounds_max);
+    return VSH_OK;
 }
 
 /* Chooses the voxel size on which casters of several kinds must agree before the first is voxelised. A
@@ -365,8 +371,7 @@ done:
 vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                              vsh_grid **grid, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(grid);
-    *grid = NULL;
+    VSHI_MAKES(grid);
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
     if (scene->caster_count == 0) {

@@ -714,8 +714,7 @@ static vsh_result check_transform(const double transform[12], const char *list, 
 
 vsh_result vsh_assets_load(vsh_scene *scene, const vsh_run *run, vsh_assets **assets, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(assets);
-    *assets = NULL;
+    VSHI_MAKES(assets);
     VSHI_NEEDS(scene);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
@@ -749,7 +748,7 @@ vsh_result vsh_assets_load(vsh_scene *scene, const vsh_run *run, vsh_assets **as
         VSHI_TRY_DONE(check_triangles(i < casters ? &loaded->casters[i] : &loaded->receivers[i - casters],
                                       &full, error));
     }
-    loaded->info = vshi_scene_measure(scene, loaded);
+    VSHI_TRY_DONE(vshi_scene_measure(scene, loaded, &loaded->info, error));
     if (scene->ao != 0 && scene->shade.ao_distance == 0.0) {
         scene->shade.ao_distance = loaded->info.ao_distance;
     }

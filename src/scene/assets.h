@@ -105,8 +105,9 @@ const vshi_asset_place *vshi_assets_receiver(const vsh_assets *assets, size_t in
 const vsh_mesh *vshi_place_page(const vshi_asset_place *place, size_t page, size_t *first,
                                 size_t *mesh_count);
 
-/* Measures a scene with loaded assets. */
-vsh_assets_info vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets);
+/* Measures a scene with loaded assets. Errors: VSH_ERROR_MEMORY. */
+vsh_result vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets, vsh_assets_info *info,
+                              vsh_error *error);
 
 /* The meshes of all casters; they are solved. */
 const vshi_mesh_set *vshi_assets_set(const vsh_assets *assets);

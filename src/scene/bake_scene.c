@@ -249,8 +249,7 @@ done:
 
 vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_mesh *meshes,
                                size_t mesh_count, const vsh_run *run, vsh_charts **charts, vsh_error *error) {
-    VSHI_NEEDS(charts);
-    *charts = NULL;
+    VSHI_MAKES(charts);
     VSHI_NEEDS(scene);
     VSHI_TRY(check_index(scene, index, error));
     VSHI_NEEDS_OF(mesh_count, meshes);

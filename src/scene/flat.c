@@ -121,8 +121,7 @@ enum { BYTES_PER_CASTER = 1536 };
 vsh_result vshi_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,
                                    vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(outline);
-    *outline = NULL;
+    VSHI_MAKES(outline);
     VSHI_NEEDS(scene);
     const size_t count = scene->caster_count;
     vsh_outline **made = NULL;

@@ -215,8 +215,7 @@ static vsh_light make_light(const vshi_model_light *given, double angle, double 
 
 vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                   vsh_light **lights, size_t *count, vsh_error *error) {
-    VSHI_NEEDS(lights);
-    *lights = NULL;
+    VSHI_MAKES(lights);
     VSHI_NEEDS(count);
     *count = 0;
     VSHI_NEEDS(model);
@@ -245,8 +244,7 @@ vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double r
 
 vsh_result vsh_lights_read(const char *path, double angle, double radius, double unit, const vsh_run *run,
                            vsh_light **lights, size_t *count, vsh_error *error) {
-    VSHI_NEEDS(lights);
-    *lights = NULL;
+    VSHI_MAKES(lights);
     VSHI_NEEDS(count);
     *count = 0;
     vsh_model *model = NULL;

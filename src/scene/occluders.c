@@ -538,8 +538,7 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
                                const vsh_scene_occluders_options *options, const vsh_run *run,
                                vsh_occluders **occluders, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    *occluders = NULL;
+    VSHI_MAKES(occluders);
     VSHI_NEEDS(scene);
     VSHI_NEEDS(assets);
     occluder_build m = {.scene = scene,

@@ -238,8 +238,7 @@ vsh_result vsh_provenance_create(const vsh_provenance_source *source, const vsh_
                                  vsh_provenance **provenance, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NUMBERS;
-    VSHI_NEEDS(provenance);
-    *provenance = NULL;
+    VSHI_MAKES(provenance);
     VSHI_NEEDS(source);
     vsh_provenance_source full = vsh_provenance_source_default();
     vsh_run settings;

@@ -72,8 +72,9 @@ static vsh_result read_auto(vshi_json *reader, const vshi_value *value, const vs
     }
     return strcmp(json_string_value(value->json), "auto") == 0
                ? VSH_OK
-               : vshi_json_fail(reader, value, "\"%.64s\" is none of auto, a number from %g to %g",
-                                json_string_value(value->json), key->lowest, key->highest);
+               : vshi_json_fail(reader, value, "\"%.64s\" is none of auto, a %snumber from %g to %g",
+                                json_string_value(value->json), key->kind == VSHI_INTEGER ? "whole " : "",
+                                key->lowest, key->highest);
 }
 
 /* Texels, or "auto". */

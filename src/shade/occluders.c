@@ -179,8 +179,7 @@ static vsh_result make_field(const vsh_grid *grid, const vshi_field_options *opt
 vsh_result vsh_occluders_from_grid(const vsh_grid *grid, const vsh_occluders_options *options,
                                    const vsh_run *run, vsh_occluders **occluders, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    *occluders = NULL;
+    VSHI_MAKES(occluders);
     VSHI_NEEDS(grid);
     vsh_occluders_options full = vsh_occluders_options_default();
     VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_occluders_options", error));
@@ -211,8 +210,7 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
                                 const vsh_occluders_options *options, const vsh_run *run,
                                 vsh_occluders **occluders, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    *occluders = NULL;
+    VSHI_MAKES(occluders);
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_occluders_options full = vsh_occluders_options_default();
     VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_occluders_options", error));

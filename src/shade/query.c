@@ -454,8 +454,7 @@ static vsh_result prepare(vsh_query *q, const vsh_occluders *occluders, const vs
 
 vsh_result vsh_query_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
                             const vsh_shade_options *options, vsh_query **query, vsh_error *error) {
-    VSHI_NEEDS(query);
-    *query = NULL;
+    VSHI_MAKES(query);
     VSHI_NEEDS(occluders);
     VSHI_NEEDS_OF(light_count, lights);
     return vshi_query_create(occluders, lights, light_count, options, false, query, error);

@@ -169,15 +169,14 @@ void vshi_windows_sum(vshi_windows *w) {
             if (e->rays > 0) {
                 const double scaled = (double)e->value * (1.0 / VSHI_WINDOW_UNIT);
                 const uint64_t value = (uint64_t)scaled;
-                row.of[VSHI_WINDOW_VALUES] += value;
-                row.of[VSHI_WINDOW_VALUES_X] += value * x;
-                row.of[VSHI_WINDOW_VALUES_Y] += value * y;
-                row.of[VSHI_WINDOW_SQUARES] += (uint64_t)(scaled * (double)e->value);
-                row.of[VSHI_WINDOW_SPREADS] +=
-                    (uint64_t)((double)e->spread * (1.0 / VSHI_WINDOW_SPREAD_UNIT));
-                row.of[VSHI_WINDOW_RAYS] += (uint64_t)e->rays;
+                row.of[VSHI_SUM_V] += value;
+                row.of[VSHI_SUM_VX] += value * x;
+                row.of[VSHI_SUM_VY] += value * y;
+                row.of[VSHI_SUM_VV] += (uint64_t)(scaled * (double)e->value);
+                row.of[VSHI_SUM_SPREADS] += (uint64_t)((double)e->spread * (1.0 / VSHI_WINDOW_SPREAD_UNIT));
+                row.of[VSHI_SUM_RAYS] += (uint64_t)e->rays;
             }
-            row.of[VSHI_WINDOW_BREAKS] +=
+            row.of[VSHI_SUM_BREAKS] +=
                 x > 0 && y > 0 && !(e->left && e->above && e[-1].above && (e - width)->left);
             for (int s = 0; s < VSHI_WINDOW_SUMS; ++s) {
                 here[x + 1].of[s] = above[x + 1].of[s] + row.of[s];

@@ -12,7 +12,10 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { VSHI_WINDOW_REACH = 7 /* texels that a window extends beyond its texel, at most */ };
+enum {
+    VSHI_WINDOW_REACH = 7, /* texels that a window extends beyond its texel, at most */
+    VSHI_WINDOW_SUMS = 8   /* a line of the cache */
+};
 
 /* A share of rays that are free. `rays` 0: there is no such texel. */
 typedef struct vshi_window_texel {
@@ -64,17 +67,9 @@ bool vshi_links_lead(const vshi_texel_map *map, const int32_t from[2], const int
 
 /* --- windows */
 
-/* Sums over texels. Breaks are squares of 2 × 2 texels that are not linked. */
-enum {
-    VSHI_WINDOW_VALUES,
-    VSHI_WINDOW_VALUES_X,
-    VSHI_WINDOW_VALUES_Y,
-    VSHI_WINDOW_SQUARES,
-    VSHI_WINDOW_SPREADS,
-    VSHI_WINDOW_RAYS,
-    VSHI_WINDOW_BREAKS,
-    VSHI_WINDOW_SUMS = 8 /* a line of the cache */
-};
+/* Sums: of values, also times columns (X) and rows (Y), of squared values, spreads and rays, and of breaks:
+ * squares of 2 × 2 texels that are not linked. */
+enum { VSHI_SUM_V, VSHI_SUM_VX, VSHI_SUM_VY, VSHI_SUM_VV, VSHI_SUM_SPREADS, VSHI_SUM_RAYS, VSHI_SUM_BREAKS };
 
 /* Values and spreads are summed as multiples of these. */
 #define VSHI_WINDOW_UNIT 0x1p-24

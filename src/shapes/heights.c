@@ -248,8 +248,7 @@ done:
 vsh_result vsh_model_from_heights(const vsh_heights_source *source, vsh_heights_part part, const vsh_run *run,
                                   vsh_model **model, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    *model = NULL;
+    VSHI_MAKES(model);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     return vshi_model_of_heights(source, part, NULL, &full, model, error);
@@ -365,8 +364,7 @@ static vsh_result check_transform(const checked_heights *t, double *scale, vsh_e
 vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *run, vshi_heights **heights,
                                vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(heights);
-    *heights = NULL;
+    VSHI_MAKES(heights);
     vsh_run full;
     checked_heights t;
     double scale = 1.0;

@@ -628,8 +628,7 @@ void vsh_outline_free(vsh_outline *o) {
 vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts, size_t contour_count,
                                      const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(outline);
-    *outline = NULL;
+    VSHI_MAKES(outline);
     VSHI_NEEDS_OF(contour_count, points);
     VSHI_NEEDS_OF(contour_count, counts);
     vsh_run full;
@@ -647,8 +646,7 @@ vsh_result vsh_outline_from_polygons(const double *points, const size_t *counts,
 vsh_result vshi_outline_unite(const vshi_outline_instance *instances, size_t instance_count,
                               const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(outline);
-    *outline = NULL;
+    VSHI_MAKES(outline);
     if (instances == NULL || instance_count == 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_outline_unite: no instances");
     }

@@ -297,8 +297,7 @@ static vsh_result check_options(const vsh_mask_options *options, vsh_error *erro
 vsh_result vshi_outline_from_image(const char *path, const vsh_mask_options *options, const vsh_run *run,
                                    vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(outline);
-    *outline = NULL;
+    VSHI_MAKES(outline);
     VSHI_NEEDS(path);
     vsh_mask_options full = vsh_mask_options_default();
     vsh_run full_run;

@@ -362,8 +362,7 @@ static vsh_result check_options(const vsh_text_options *options, vsh_error *erro
 vsh_result vshi_outline_from_text(const char *text, const char *font, const vsh_text_options *options,
                                   const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(outline);
-    *outline = NULL;
+    VSHI_MAKES(outline);
     VSHI_NEEDS(text);
     VSHI_NEEDS(font);
     vsh_text_options full = vsh_text_options_default();

@@ -235,8 +235,7 @@ static vsh_result make(vshi_spheres *made, const double *spheres, const double *
 vsh_result vshi_spheres_create(const double *spheres, size_t count, const double *transform,
                                const vsh_run *run, vshi_spheres **made, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(made);
-    *made = NULL;
+    VSHI_MAKES(made);
     VSHI_NEEDS_OF(count, spheres);
     vsh_run full;
     double scale = 1.0;
@@ -522,8 +521,7 @@ vsh_result vshi_spheres_read(const char *path, const vsh_run *run, double **sphe
                              vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NUMBERS;
-    VSHI_NEEDS(spheres);
-    *spheres = NULL;
+    VSHI_MAKES(spheres);
     VSHI_NEEDS(path);
     VSHI_NEEDS(count);
     *count = 0;

@@ -625,8 +625,7 @@ vsh_result vshi_triangles_of_quads(const vshi_quads *quads, const vsh_run *run, 
 vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi_solids *solids,
                                  const vsh_run *run, vshi_triangles **triangles, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(triangles);
-    *triangles = NULL;
+    VSHI_MAKES(triangles);
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));

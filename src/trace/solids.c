@@ -148,8 +148,7 @@ static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t co
 vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count,
                               vshi_solids **solids, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(solids);
-    *solids = NULL;
+    VSHI_MAKES(solids);
     VSHI_NEEDS_OF(count, sdfs);
     static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     size_t nodes;

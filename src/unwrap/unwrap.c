@@ -373,8 +373,7 @@ done:
 vsh_result vsh_unwrap(const vsh_mesh *meshes, size_t mesh_count, const vsh_unwrap_options *options,
                       const vsh_run *run, vsh_atlas **atlas, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(atlas);
-    *atlas = NULL;
+    VSHI_MAKES(atlas);
     VSHI_NEEDS_OF(mesh_count, meshes);
     vsh_run full;
     vsh_unwrap_options o = vsh_unwrap_options_default();

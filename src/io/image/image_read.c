@@ -244,8 +244,7 @@ static vsh_result read_file(const char *path, const vsh_run *run, vsh_image_file
 
 vsh_result vsh_image_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(file);
-    *file = NULL;
+    VSHI_MAKES(file);
     VSHI_NEEDS(path);
     if (path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vsh_image_read: no path was given");

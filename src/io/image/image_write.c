@@ -552,8 +552,7 @@ vsh_result vshi_image_writer_create(const char *path, const vsh_image *image,
                                     const vsh_image_options *options, vshi_image_writer **writer,
                                     vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(writer);
-    *writer = NULL;
+    VSHI_MAKES(writer);
     return create(path, image, options, false, writer, error);
 }
 

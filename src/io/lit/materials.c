@@ -371,14 +371,12 @@ static vsh_result set_textures(vshi_lit_work *work, json_t *material, const vshi
         vshi_lit_set(work, extensions, "MOZ_lightmap", info);
         vshi_lit_use_extension(work, "MOZ_lightmap");
     }
-    if (page->textures[VSH_LIT_PREVIEW] > 0 && !vshi_lit_is_cut_by_texture(material)) {
+    const bool preview = page->textures[VSH_LIT_PREVIEW] > 0 && !vshi_lit_is_cut_by_texture(material);
+    if (preview) {
         VSHI_TRY(vshi_lit_find_object(work, material, "pbrMetallicRoughness", &base, error));
-        VSHI_TRY(vshi_lit_find_object(work, material, "extensions", &extensions, error));
         vshi_lit_set(work, base, "baseColorTexture", make_texture_info(work, VSH_LIT_PREVIEW, look));
-        vshi_lit_set(work, extensions, "KHR_materials_unlit", json_object());
-        vshi_lit_use_extension(work, "KHR_materials_unlit");
     }
-    if (page->unlit) {
+    if (preview || page->unlit) {
         VSHI_TRY(vshi_lit_find_object(work, material, "extensions", &extensions, error));
         vshi_lit_set(work, extensions, "KHR_materials_unlit", json_object());
         vshi_lit_use_extension(work, "KHR_materials_unlit");

@@ -386,8 +386,7 @@ static vsh_result read_in_reader(const reading *r, vsh_error *error);
 
 vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    *model = NULL;
+    VSHI_MAKES(model);
     VSHI_NEEDS(path);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
