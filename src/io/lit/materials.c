@@ -387,6 +387,16 @@ static vsh_result set_textures(vshi_lit_work *work, json_t *material, const vshi
     return VSH_OK;
 }
 
+/* Names a material after its number, unless it keeps a name that only it has: engines find materials by name.
+ */
+static void name_material(vshi_lit_work *work, json_t *material, size_t number, bool is_copy) {
+    const char *name = json_string_value(json_object_get(material, "name"));
+    if (is_copy || name == NULL || name[0] == '\0') {
+        vshi_lit_set(work, material, "name",
+                     json_sprintf("%s.%zu", name != NULL && name[0] != '\0' ? name : "material", number));
+    }
+}
+
 /* Makes the material of a look: in place of the old one if nobody has taken that, else a new one. Replaced
  * ones wait in changed[], as others are still copied from the old ones. */
 static vsh_result make_material(vshi_lit_work *work, vshi_lit_look *look, bool *taken, json_t **changed,
@@ -407,8 +417,10 @@ static vsh_result make_material(vshi_lit_work *work, vshi_lit_look *look, bool *
         taken[look->material] = true;
         changed[look->material] = material;
         look->made = look->material;
+        name_material(work, material, look->made, false);
     } else {
         look->made = vshi_lit_append(work, "materials", material);
+        name_material(work, material, look->made, look->material != SIZE_MAX);
     }
     return VSH_OK;
 }
