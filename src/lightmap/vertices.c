@@ -12,8 +12,8 @@
 /* Weight of a squared difference along an edge, as a share of the triangle's area. It decides for vertices
  * without points, and moves the others by less than the points' noise does. */
 static const double SMOOTH = 1e-3;
-/* Sweeps end when no colour moves by more than this, a quarter of a step of 16 bits. */
-static const double SETTLED = 4e-6;
+/* Sweeps end when no colour with points moves by more than this, far less than the points' noise. */
+static const double SETTLED = 1e-4;
 enum { SWEEPS = 400 };
 
 typedef struct fit {
@@ -65,7 +65,7 @@ static void key_of_vertex(const void *user, size_t vertex, uint64_t key[VSHI_KEY
     const size_t m = vshi_find_group(f->first, f->charts->sorted.mesh_count, vertex),
                  v = vertex - f->first[m];
     const vsh_mesh *mesh = &f->charts->sorted.meshes[m];
-    const vshi_vec at = vshi_mesh_place(mesh, v);
+    const vshi_vec at = vshi_sub(vshi_mesh_place(mesh, v), vshi_vec_of(f->charts->centre)); /* for floats */
     const vshi_vec n = mesh->normals != NULL
                            ? vshi_transform_normal(mesh->transform, vshi_vec_off(mesh->normals + 3 * v))
                            : (vshi_vec){0.0, 0.0, 0.0};
@@ -110,7 +110,7 @@ static vsh_result add_up(fit *f, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Moves a vertex to the best value in range while the others stay; returns the step. */
+/* Moves a vertex to the best value in range while the others stay; returns the step, 0 without points. */
 static double relax(fit *f, size_t vertex) {
     double diagonal = 0.0;
     vshi_vec rest = f->right[vertex];
@@ -125,11 +125,11 @@ static double relax(fit *f, size_t vertex) {
     }
     const vshi_vec before = f->x[vertex];
     f->x[vertex] = cut(vshi_scale(rest, 1.0 / diagonal));
-    return vshi_length(vshi_sub(f->x[vertex], before));
+    return vshi_length(f->right[vertex]) > 0.0 ? vshi_length(vshi_sub(f->x[vertex], before)) : 0.0;
 }
 
-/* Projected Gauss-Seidel (Cryer 1971), forwards and backwards in turn: on one thread, as the shading of the
- * points takes far longer. */
+/* Projected Gauss-Seidel (Cryer 1971), forwards and backwards in turn: on one thread, in an order that is
+ * always the same. */
 static vsh_result solve(fit *f, const vsh_run *run, vsh_error *error) {
     vshi_job *job;
     vsh_result result = VSH_OK;

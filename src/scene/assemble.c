@@ -372,8 +372,7 @@ vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, c
                              vsh_grid **grid, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(grid);
-    VSHI_NEEDS(scene);
-    VSHI_NEEDS(assets);
+    VSHI_NEEDS_BOTH(scene, assets);
     if (scene->caster_count == 0) {
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: no casters");
     }

@@ -55,12 +55,12 @@ static vsh_result check_vertex_colors(const vsh_scene *scene, const vsh_receiver
     for (size_t i = 0; i < scene->light_count && !known; ++i) {
         known = strncmp(what, "shadow.", 7) == 0 && strcmp(what + 7, scene->lights[i].name) == 0;
     }
-    return known && vsh_lit_is_output(receiver->output)
+    return known && scene->bent != VSH_BENT_TANGENT && vsh_lit_is_output(receiver->output)
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_ARGUMENT,
                            "%s: vertex colours '%.64s': expected ao (with --ao), irradiance (with lights) or "
-                           "shadow.NAME of a light, into a .glb, .gltf or .obj",
-                           receiver->output, what);
+                           "shadow.NAME of a light, into a .glb, .gltf or .obj, without tangent space",
+                           receiver->output != NULL ? receiver->output : receiver->path, what);
 }
 
 static vsh_result check_image(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error) {
@@ -70,9 +70,10 @@ static vsh_result check_image(const vsh_receiver *receiver, const vsh_image *ima
     if (result == VSH_OK) {
         return VSH_OK;
     }
-    return vshi_fail(
-        error, result, "%s%s", why.message,
-        vshi_image_is_written(receiver->output) ? "" : "; or glb, gltf, obj for the mesh with its light");
+    return vshi_fail(error, result, "%s%s", why.message,
+                     receiver->output == NULL || vshi_image_is_written(receiver->output)
+                         ? ""
+                         : "; or glb, gltf, obj for the mesh with its light");
 }
 
 vsh_result vsh_receiver_check(const vsh_scene *scene, size_t index, vsh_error *error) {
@@ -129,15 +130,17 @@ static vsh_result check_outputs(const vsh_scene *scene, const vsh_bake_options *
 
 /* --- loading */
 
-/* Adds irradiance and ambient light to a scene whose outputs are all assets. */
-static void light_assets(vsh_scene *scene) {
+/* Adds irradiance to a scene for vertex colours, and with ambient light if all outputs are assets. */
+static void light_assets(vsh_scene *scene, bool writes) {
     static const double AMBIENT = 0.25; /* linear, if the scene names none: shadows are not black */
+    bool assets = writes && scene->light_count > 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
-        if (!vsh_lit_is_output(scene->receivers[i].output)) {
-            return;
-        }
+        const vsh_receiver *receiver = &scene->receivers[i];
+        assets = assets && vsh_lit_is_output(receiver->output);
+        scene->irradiance |=
+            receiver->vertex_colors != NULL && strcmp(receiver->vertex_colors, "irradiance") == 0;
     }
-    if (scene->light_count == 0) {
+    if (!assets) {
         return;
     }
     scene->irradiance = 1;
@@ -163,9 +166,7 @@ static vsh_result load(vshi_scene_bake *bake, const vsh_scene *scene, const vsh_
     }
     VSHI_TRY(check_shard(&bake->options, error));
     VSHI_TRY(check_outputs(scene, &bake->options, forecast, error));
-    if (bake->options.rows == NULL) {
-        light_assets(&bake->scene);
-    }
+    light_assets(&bake->scene, bake->options.rows == NULL);
     VSHI_TRY(vsh_assets_load(&bake->scene, &bake->run, &bake->assets, error));
     bake->report.ao_distance = bake->scene.ao != 0 ? bake->scene.shade.ao_distance : 0.0;
     VSHI_TRY(vshi_list_lightmaps(bake, error));
@@ -669,8 +670,7 @@ static vsh_result try_few_voxels(const vshi_scene_bake *bake, vsh_bake_forecast 
 
 vsh_result vsh_forecast_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                               vsh_bake_forecast *forecast, vsh_error *error) {
-    VSHI_NEEDS(scene);
-    VSHI_NEEDS(forecast);
+    VSHI_NEEDS_BOTH(scene, forecast);
     vshi_scene_bake bake;
     vsh_bake_forecast f = {.lightmap_count = 0};
     vsh_result result;

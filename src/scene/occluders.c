@@ -539,8 +539,7 @@ vsh_result vsh_scene_occluders(const vsh_scene *scene, const vsh_assets *assets,
                                vsh_occluders **occluders, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(occluders);
-    VSHI_NEEDS(scene);
-    VSHI_NEEDS(assets);
+    VSHI_NEEDS_BOTH(scene, assets);
     occluder_build m = {.scene = scene,
                         .assets = assets,
                         .options = vsh_scene_occluders_options_default(),

@@ -532,6 +532,14 @@ static vsh_result write_vertex_colors(const vshi_scene_page *page, vsh_error *er
     const char *what = page->target->receiver.vertex_colors;
     const bool irradiance = strcmp(what, "irradiance") == 0;
     const float *values = irradiance ? planes->irradiance : planes->ao;
+    float brightest = 0.0f;
+    for (size_t i = 0; irradiance && i < 3 * vshi_page_texels(&page->page); ++i) {
+        brightest = planes->coverage[i / 3] == 1.0f ? fmaxf(brightest, values[i]) : brightest;
+    }
+    if (brightest > 1.0f) {
+        vshi_warn(&bake->run, "%s: light of up to %.3g is cut to 1; dim the lights, or bake a lightmap",
+                  lightmap->output, (double)brightest);
+    }
     for (size_t i = 0; i < bake->scene.light_count; ++i) {
         values = strcmp(what, page->channels.names[i]) == 0 ? planes->shadow[i] : values;
     }

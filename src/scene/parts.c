@@ -634,8 +634,7 @@ done:
 
 vsh_result vsh_part_words(const char *parts, int32_t shard_count, const vsh_run *run, char ***words,
                           size_t *count, vsh_error *error) {
-    VSHI_NEEDS(words);
-    VSHI_NEEDS(count);
+    VSHI_NEEDS_BOTH(words, count);
     *words = NULL;
     *count = 0;
     VSHI_NEEDS(parts);

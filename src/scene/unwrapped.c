@@ -279,8 +279,7 @@ static vsh_result list_pages(vshi_asset_place *place, const vsh_receiver *receiv
 
 vsh_result vsh_model_densities(const vsh_model *model, const char *path, const vsh_density_rule *rules,
                                size_t count, double *density, vsh_error *error) {
-    VSHI_NEEDS(model);
-    VSHI_NEEDS(path);
+    VSHI_NEEDS_BOTH(model, path);
     VSHI_NEEDS(density);
     VSHI_NEEDS_OF(count, rules);
     const size_t meshes = vsh_model_mesh_count(model);

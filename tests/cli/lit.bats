@@ -56,6 +56,10 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     refuses 2 a.glb "vertex colours 'shadow.moon'" -- bake in.glb --sun 0,1,0 --vertex-colors shadow.moon -o a.glb
     refuses 2 --size -- bake in.glb --ao 1 --vertex-colors ao --size 8 -o a.glb
     [ "$(files)" = in.glb ] || fail "$(files)"
+    echo '{"casters": [{"mesh": "in.glb"}], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "color": [9, 9, 9]}],
+        "receivers": [{"mesh": "in.glb", "output": "a.glb", "vertex_colors": "irradiance"}, {"mesh": "in.glb", "output": "a.exr", "size": 16}]}' >both.json
+    succeed bake both.json
+    [[ $stderr == *'light of up to'*'is cut to 1'* ]] || fail "$stderr"
 }
 
 # sets_are FILE COUNT [SET …]: the count of its UV sets, and those that its materials use.

@@ -157,14 +157,17 @@ static int check_kinds(const cli_bake_settings *s, const vsh_scene *scene) {
     CLI_TRY(check_ending("invalid", s->invalid_picture, "png"));
     CLI_TRY(check_ending("exr", s->exr, "exr"));
     CLI_TRY(check_ending("view", s->view, "html"));
-    static const char *const of_lightmaps[] = {"size", "unwrap", "per-object", "pages", "exr", "invalid"};
-    size_t assets = 0;
+    static const char *const of_lightmaps[] = {
+        "size",    "unwrap",      "per-object", "pages", "padding", "seams", "texels-per-unit",
+        "density", "supersample", "uv-set",     "exr",   "invalid"};
+    size_t assets = 0, colored = 0;
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         assets += vsh_lit_is_output(scene->receivers[i].output) != 0;
+        colored += scene->receivers[i].vertex_colors != NULL;
     }
     for (size_t i = 0; i < CLI_COUNT(of_lightmaps); ++i) {
-        CLI_REFUSE_IF(scene->receivers[0].vertex_colors != NULL && cli_was_given(of_lightmaps[i]),
-                      "--%s: is for lightmaps, and --vertex-colors makes none", of_lightmaps[i]);
+        CLI_REFUSE_IF(colored > 0 && colored == scene->receiver_count && cli_was_given(of_lightmaps[i]),
+                      "--%s: is for lightmaps, not for vertex colours", of_lightmaps[i]);
     }
     CLI_REFUSE_IF(for_assets != NULL && assets == 0, "--%s: is for outputs that end in .glb, .gltf or .obj",
                   for_assets);
@@ -271,7 +274,7 @@ static void say_lightmap(void *user, const vsh_scene_lightmap *lightmap) {
     const bake_run *b = user;
     if (has_lines(b) && b->scene->receivers[lightmap->receiver].vertex_colors != NULL) {
         cli_inform("%s: vertex colours by %" PRIu64 " points, %" PRIu64
-                   " of them hidden; at most %.2g off between a mesh's vertices (RMSE)",
+                   " of them hidden; RMSE between the vertices of the worst mesh %.2g",
                    lightmap->output, lightmap->covered, lightmap->invalid_texels, lightmap->vertex_error);
     } else if (has_lines(b)) {
         cli_inform("%s: %d × %d, %" PRIu64 " texels, %" PRIu64 " of them invalid", lightmap->output,
