@@ -49,7 +49,7 @@ if(VSH_STATIC AND NOT VSH_SANITIZE)
     target_sources(vdbshade_static PRIVATE ${VSH_IMPORTERS_CALLS})
   endif()
   foreach(found openvdb half png assimp draco meshoptimizer jansson nettle sleef seccomp)
-    if(NOT VSH_${found}_LIBRARY) # left out
+    if(NOT TARGET vsh::${found}) # left out
       continue()
     endif()
     cmake_path(GET VSH_${found}_LIBRARY FILENAME file)

@@ -45,7 +45,7 @@ def get_requires_for_build_wheel(config_settings=None):
 
 def install(stage, info):
     """Builds the library and the module in build-wheel, and installs them."""
-    python, environment = find_python()
+    python, environment = find_python() or sys.exit("vdbshade: the module needs cffi to be built (python3-cffi)")
     build = ROOT / "build-wheel"
     options = {"CMAKE_BUILD_TYPE": "Release", "VSH_STATIC": "OFF", "VSH_PYTHON": "ON", "VSH_PYTHON_PROGRAM": python,
                "VSH_PYTHON_DIR": ".", "CMAKE_INSTALL_LIBDIR": "vdbshade/lib", "CMAKE_INSTALL_LIBEXECDIR": "vdbshade/lib",

@@ -33,6 +33,13 @@ VSHI_SHARED vsh_result vshi_fail_memory(vsh_error *error, const char *what);
         }                                                                                                    \
     } while (0)
 
+/* Does the same for two pointers. */
+#define VSHI_NEEDS_BOTH(first, second)                                                                       \
+    do {                                                                                                     \
+        VSHI_NEEDS(first);                                                                                   \
+        VSHI_NEEDS(second);                                                                                  \
+    } while (0)
+
 /* Does the same for the place of a result, and sets the result to NULL. */
 #define VSHI_MAKES(place)                                                                                    \
     do {                                                                                                     \

@@ -485,8 +485,7 @@ vsh_result vshi_file_digest(const char *path, char digest[VSH_DIGEST_TEXT], vshi
 
 vsh_result vsh_file_digest(const char *path, const vsh_run *run, char digest[VSH_DIGEST_TEXT],
                            vsh_error *error) {
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(digest);
+    VSHI_NEEDS_BOTH(path, digest);
     if (path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "digest: no path");
     }

@@ -38,7 +38,8 @@ static inline double vshi_length(vshi_vec a) {
     return sqrt(vshi_dot(a, a));
 }
 
-/* Rounds to three digits, and above 1000 to a whole number, so that "%.10g" reads back as the same double. */
+/* Rounds to three digits, and above 1000 to a whole number. Up to 1e10 "%.10g" reads back as the
+ * same double. */
 static inline double vshi_round_digits(double value) {
     double scale = 1.0; /* powers of ten are exact up to 1e22 */
     while (value * scale < 100.0 && scale < 1e22) {

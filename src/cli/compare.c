@@ -511,7 +511,9 @@ static void write_measures(FILE *out, const vsh_channel_comparison *channel) {
 static void write_channel(FILE *out, const vsh_channel_comparison *channel, const char *pictures) {
     cli_write(out, "<h3>", channel->name, ": ");
     fprintf(out, "%s</h3>\n", verdict(channel->alike));
-    cli_write(out, "<p>", explain(channel), "</p>\n");
+    if (explain(channel)[0] != '\0') {
+        cli_write(out, "<p>", explain(channel), "</p>\n");
+    }
     if (channel->is_coverage) {
         fprintf(out,
                 "<p>%" PRIu64 " texels covered in golden, %" PRIu64 " in new, %" PRIu64

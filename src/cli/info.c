@@ -299,7 +299,8 @@ static int state_scene(json_t *root, const char *path, const int32_t size[2]) {
     if (scene->ao) {
         const char *ao = vsh_get_name(VSH_NAMES_AO, scene->shade.ao_method);
         state(root, "ao", json_pack("{s:s,s:f}", "method", ao, "distance", scene->shade.ao_distance),
-              "ao: %s, within %g\n", ao, scene->shade.ao_distance);
+              scene->shade.ao_distance > 0.0 ? "ao: %s, within %g\n" : "ao: %s, distance auto\n", ao,
+              scene->shade.ao_distance);
     }
     vsh_scene_free(scene);
     return CLI_OK;
@@ -438,7 +439,9 @@ static int state_mesh(json_t *of, const mesh_info *info, size_t index, const vsh
     }
     state(of, "normals", json_boolean(mesh.normals != NULL), "  normals: %s\n",
           mesh.normals != NULL ? "yes" : "no, flat");
-    state_bounds(of, "  ", report.bounds_min, report.bounds_max);
+    if (report.bounds_min[0] <= report.bounds_max[0]) { /* it has an area */
+        state_bounds(of, "  ", report.bounds_min, report.bounds_max);
+    }
     state(of, "area", json_real(report.area), "  area: %g\n", report.area);
     if (mesh.alpha != VSH_ALPHA_OPAQUE) {
         const bool blended = mesh.alpha == VSH_ALPHA_BLENDED;

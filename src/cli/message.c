@@ -375,6 +375,7 @@ void cli_complete_run(void) {
  * the text before began, so that text's last byte is checked again. */
 static ssize_t write_plain(void *last, const char *text, size_t size) {
     char *before = last, *plain = malloc(size + 1);
+    cli_end_progress(); /* both may be the same terminal */
     plain[0] = *before;
     memcpy(plain + 1, text, size);
     *before = plain[size];

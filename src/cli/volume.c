@@ -334,7 +334,8 @@ static int finish(volume_work *work) {
     if (work->settings->slices) {
         int32_t size[3];
         get_size(work, size);
-        cli_inform("%s: %d slices of %d x %d", work->settings->bake.output, size[2], size[0], size[1]);
+        cli_inform("%s: %d slice%s of %d x %d", work->settings->bake.output, size[2], size[2] == 1 ? "" : "s",
+                   size[0], size[1]);
     }
     cli_stats_say(stats);
     return CLI_OK;

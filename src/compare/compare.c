@@ -186,8 +186,7 @@ static void measure_accuracy(const vshi_pair *pairs, size_t pair_count, tally *t
 vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count, const vsh_run *run,
                                 vsh_accuracy *accuracy, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(planes);
-    VSHI_NEEDS(accuracy);
+    VSHI_NEEDS_BOTH(planes, accuracy);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     double values = 0.0;
@@ -345,8 +344,7 @@ static vsh_result measure_all(const vshi_pair *pair, const vsh_compare_options *
 vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options, const vsh_run *run,
                        vsh_measures *measures, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(compared);
-    VSHI_NEEDS(measures);
+    VSHI_NEEDS_BOTH(compared, measures);
     vsh_run full;
     vsh_compare_options chosen = vsh_compare_options_default();
     double values = 0.0;

@@ -642,8 +642,7 @@ vsh_result vsh_compare_files(const char *golden, const char *fresh, const vsh_co
                              const vsh_run *run, vsh_comparison **comparison, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(comparison);
-    VSHI_NEEDS(golden);
-    VSHI_NEEDS(fresh);
+    VSHI_NEEDS_BOTH(golden, fresh);
     files f = {.path = {golden, fresh}, .options = vsh_compare_files_options_default()};
     VSHI_TRY(vshi_run_resolve(run, &f.run, error));
     VSHI_TRY(vshi_options_resolve(options, &f.options, sizeof f.options, "options", error));

@@ -223,8 +223,7 @@ void vshi_mesh_set_note(const vshi_mesh_set *set, double shell, double voxel, co
 
 vsh_result vsh_mesh_check(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(mesh);
-    VSHI_NEEDS(report);
+    VSHI_NEEDS_BOTH(mesh, report);
     vsh_mesh_report found;
     vshi_tight_meshes tight;
     vsh_result result;

@@ -294,10 +294,8 @@ void vshi_grid_block_signs(const vsh_grid *grid, const int32_t origin[3], const 
 
 vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const int32_t size[3],
                          float *values, vsh_error *error) {
-    VSHI_NEEDS(grid);
-    VSHI_NEEDS(index_min);
-    VSHI_NEEDS(size);
-    VSHI_NEEDS(values);
+    VSHI_NEEDS_BOTH(grid, index_min);
+    VSHI_NEEDS_BOTH(size, values);
     return vshi::guard(error, VSH_ERROR_INTERNAL, "grid",
                        [&] { vshi::copy_dense(grid->level_set->constTree(), index_min, size, values); });
 }
@@ -326,8 +324,7 @@ vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32
 
 vsh_result vsh_grid_to_openvdb(const vsh_grid *grid, uint32_t version, uint32_t abi, void *level_set,
                                vsh_error *error) {
-    VSHI_NEEDS(grid);
-    VSHI_NEEDS(level_set);
+    VSHI_NEEDS_BOTH(grid, level_set);
     return vshi::guard(error, VSH_ERROR_LIMIT, "OpenVDB", [&] {
         vshi::check_openvdb(version, abi);
         *static_cast<openvdb::FloatGrid::ConstPtr *>(level_set) = vshi::named_surface(*grid, "surface");

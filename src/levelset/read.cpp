@@ -435,8 +435,7 @@ vsh_result vsh_vdb_list(const char *path, const vsh_run *run, vsh_vdb_entry *ent
 vsh_result vshi_vdb_copy(const char *path, const char *name, const int32_t index_min[3],
                          const int32_t size[3], const vsh_run *run, float *values, float *active,
                          vsh_error *error) {
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(index_min);
+    VSHI_NEEDS_BOTH(path, index_min);
     VSHI_NEEDS(size);
     return vshi::guard_run(run, error, VSH_ERROR_READ, path, [&](const vsh_run &full) {
         vshi::copy({path, name, {index_min[0], index_min[1], index_min[2]}, {size[0], size[1], size[2]}},

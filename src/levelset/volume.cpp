@@ -380,8 +380,7 @@ vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3],
                                const vsh_run *run, vsh_voxels **voxels, vsh_error *error) {
     VSHI_NEEDS(voxels);
     *voxels = nullptr;
-    VSHI_NEEDS(box_min);
-    VSHI_NEEDS(box_max);
+    VSHI_NEEDS_BOTH(box_min, box_max);
     return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "box", [&](const vsh_run &full) {
         vshi::initialize();
         *voxels = vshi::from_box(box_min, box_max, voxel_size, full);
@@ -491,10 +490,8 @@ void vsh_volume_get_grid(const vsh_volume *volume, size_t grid, vsh_volume_grid 
 
 vsh_result vsh_volume_copy(const vsh_volume *volume, size_t grid, const int32_t index_min[3],
                            const int32_t size[3], float *values, vsh_error *error) {
-    VSHI_NEEDS(volume);
-    VSHI_NEEDS(index_min);
-    VSHI_NEEDS(size);
-    VSHI_NEEDS(values);
+    VSHI_NEEDS_BOTH(volume, index_min);
+    VSHI_NEEDS_BOTH(size, values);
     return vshi::guard(error, VSH_ERROR_INTERNAL, "volume", [&] {
         vshi::copy_dense(*vshi::channel_of(*volume, grid).tree, index_min, size, values);
     });
@@ -515,8 +512,7 @@ vsh_result vsh_volume_write(const vsh_volume *volume, const char *path, int32_t 
 
 vsh_result vsh_volume_to_openvdb(const vsh_volume *volume, size_t grid, uint32_t version, uint32_t abi,
                                  void *values, vsh_error *error) {
-    VSHI_NEEDS(volume);
-    VSHI_NEEDS(values);
+    VSHI_NEEDS_BOTH(volume, values);
     return vshi::guard(error, VSH_ERROR_LIMIT, "OpenVDB", [&] {
         vshi::check_openvdb(version, abi);
         *static_cast<openvdb::FloatGrid::ConstPtr *>(values) =

@@ -191,7 +191,7 @@ static void estimate(const estimating *s, const block *b, const uint16_t *places
 
 static void estimate_row(const estimating *s, const block *b, int32_t y) {
     const float part = 1.0f / (float)s->spacing;
-    uint16_t places[INNER];
+    uint16_t places[INNER] = {0};
     size_t count = 0;
     vshi_window_estimate estimates[INNER];
     for (int32_t at = y * WIDTH + VSHI_CELL; at < y * WIDTH + VSHI_CELL + INNER; ++at) {

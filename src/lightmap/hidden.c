@@ -322,8 +322,7 @@ vsh_result vsh_lightmap_fill_hidden(const vsh_charts *charts, const vsh_lightmap
                                     size_t light_count, const vsh_run *run, uint64_t *filled,
                                     vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(charts);
-    VSHI_NEEDS(lightmap);
+    VSHI_NEEDS_BOTH(charts, lightmap);
     VSHI_NEEDS(lightmap->coverage);
     VSHI_TRY(vshi_plane_row_check(lightmap, charts->info.width, error));
     vsh_run full;

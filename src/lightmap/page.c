@@ -287,8 +287,7 @@ vsh_result vsh_bake_lightmap(const vsh_occluders *occluders, const vsh_charts *c
                              const vsh_run *run, const vsh_lightmap *lightmap, vsh_bake_stats *stats,
                              vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    VSHI_NEEDS(charts);
+    VSHI_NEEDS_BOTH(occluders, charts);
     VSHI_NEEDS(lightmap);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_shade_options shade;

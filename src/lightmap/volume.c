@@ -749,8 +749,7 @@ vsh_result vsh_bake_volume(const vsh_occluders *occluders, const vsh_voxels *vox
                            vsh_volume **volume, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(volume);
-    VSHI_NEEDS(occluders);
-    VSHI_NEEDS(voxels);
+    VSHI_NEEDS_BOTH(occluders, voxels);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_run full;
     volume_bake bake = {.occluders = occluders,

@@ -145,8 +145,7 @@ vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const doubl
 vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], const double bounds_max[3],
                             double azimuth, double elevation, double aspect, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(bounds_min);
-    VSHI_NEEDS(bounds_max);
+    VSHI_NEEDS_BOTH(bounds_min, bounds_max);
     vsh_camera full;
     view_axes axes;
     VSHI_TRY(begin_frame(camera, azimuth, elevation, aspect, &full, &axes, error));

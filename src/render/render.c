@@ -770,8 +770,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
                       const vsh_run *run, const vsh_picture *picture, vsh_shade_stats *stats,
                       vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(picture);
-    VSHI_NEEDS(occluders);
+    VSHI_NEEDS_BOTH(picture, occluders);
     VSHI_NEEDS_OF(light_count, lights);
     vsh_render_options o = vsh_render_options_default();
     rendering r = {.options = &o,

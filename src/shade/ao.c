@@ -406,8 +406,7 @@ vsh_result vsh_shade_ao(const vsh_occluders *occluders, const vsh_points *points
                         const vsh_shade_options *options, const vsh_run *run, float *ao, float *deviation,
                         float *bent, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    VSHI_NEEDS(points);
+    VSHI_NEEDS_BOTH(occluders, points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, ao);
     vsh_run full_run;

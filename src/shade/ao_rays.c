@@ -559,7 +559,7 @@ static bool decide_tile(ray_piece *piece, tile *t, int32_t most) {
         }
     }
     vshi_windows_sum(&t->windows);
-    uint16_t places[TILE * TILE];
+    uint16_t places[TILE * TILE] = {0};
     size_t of[TILE * TILE], count = 0;
     vshi_window_estimate estimates[TILE * TILE];
     for (size_t i = 0; i < piece->count; ++i) {

@@ -388,8 +388,7 @@ vsh_result vsh_query_points(const vsh_query *query, const vsh_points *points, co
                             const vsh_run *run, const vsh_query_output *output, vsh_shade_stats *stats,
                             vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(query);
-    VSHI_NEEDS(points);
+    VSHI_NEEDS_BOTH(query, points);
     VSHI_NEEDS(output);
     vsh_run full_run;
     vsh_query_output full = vsh_query_output_default();

@@ -229,8 +229,7 @@ vsh_result vsh_shade_shadow(const vsh_occluders *occluders, const vsh_points *po
                             const vsh_shade_options *options, const vsh_run *run, float *visibility,
                             float *deviation, vsh_shade_stats *stats, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(occluders);
-    VSHI_NEEDS(points);
+    VSHI_NEEDS_BOTH(occluders, points);
     VSHI_NEEDS_OF(points->count, points->positions);
     VSHI_NEEDS_OF(points->count, visibility);
     vsh_run full_run;

@@ -363,8 +363,7 @@ vsh_result vshi_outline_from_text(const char *text, const char *font, const vsh_
                                   const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(outline);
-    VSHI_NEEDS(text);
-    VSHI_NEEDS(font);
+    VSHI_NEEDS_BOTH(text, font);
     vsh_text_options full = vsh_text_options_default();
     vsh_run full_run;
     VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_text_options", error));

@@ -522,8 +522,7 @@ vsh_result vshi_spheres_read(const char *path, const vsh_run *run, double **sphe
     VSHI_FLOATS;
     VSHI_NUMBERS;
     VSHI_MAKES(spheres);
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(count);
+    VSHI_NEEDS_BOTH(path, count);
     *count = 0;
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));

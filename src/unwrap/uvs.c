@@ -185,8 +185,7 @@ static void add_triangle(const vsh_mesh *mesh, size_t triangle, const double siz
 vsh_result vsh_uvs_measure(const vsh_mesh *mesh, int32_t width, int32_t height, vsh_uvs_measures *measures,
                            vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(mesh);
-    VSHI_NEEDS(measures);
+    VSHI_NEEDS_BOTH(mesh, measures);
     if (width < 1 || height < 1 || width > VSH_MAX_PAGE_SIZE || height > VSH_MAX_PAGE_SIZE) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "UVs measured at %d × %d: expected 1 … %d", width, height,
                          VSH_MAX_PAGE_SIZE);

@@ -237,8 +237,7 @@ static vsh_result show(surface *s, const char *name, const vsh_occluders *occlud
 vsh_result vsh_view_write_scene(const char *path, const char *name, const vsh_scene *scene,
                                 const vsh_run *run, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(name);
+    VSHI_NEEDS_BOTH(path, name);
     VSHI_NEEDS(scene);
     const size_t most_lights = VSH_MAX_CHANNELS - LIGHT_CHANNELS - 1; /* one is for AO */
     if (scene->light_count > most_lights) {

@@ -477,8 +477,7 @@ static vsh_result check_bake(const vsh_view_bake *given, const char *what, vsh_v
 vsh_result vsh_view_write(const char *path, const vsh_view_bake *bake, const vsh_view_bake *other,
                           const vsh_run *run, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(path);
-    VSHI_NEEDS(bake);
+    VSHI_NEEDS_BOTH(path, bake);
     vsh_view_bake bakes[2];
     vsh_run resolved;
     VSHI_TRY(check_bake(bake, "bake", &bakes[0], error));

@@ -318,6 +318,7 @@ static bool write_row(const cli_points_writer *w, const cli_points *points, size
 }
 
 int cli_points_write(cli_points_writer *w, const cli_points *points) {
+    cli_end_progress(); /* standard output may be the same terminal */
     for (size_t i = 0; i < points->count; ++i) {
         if (!write_row(w, points, i)) {
             return fail(w);

@@ -315,8 +315,7 @@ vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit
                          const vsh_lit_options *options, const char *output, const vsh_run *run,
                          vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(model);
-    VSHI_NEEDS(output);
+    VSHI_NEEDS_BOTH(model, output);
     vsh_run full;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     vsh_lit_options own = vsh_lit_options_default();
