@@ -1,5 +1,5 @@
-/* How much of the sun reaches points of a level, say of characters: points LEVEL.glb <FILE, with X Y Z in
- * each line */
+/* Prints how much of the sun reaches points in a level. Usage: points LEVEL.glb <FILE. Each line of FILE has
+ * the X Y Z of a point. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <vdbshade/vdbshade.h>

@@ -112,7 +112,7 @@ static void suggest_options(json_t *root, const vsh_assets_info *of, const int32
     }
 }
 
-/* States the size of what a scene's files hold; false if they cannot be loaded. */
+/* Loads a scene's files and states their size; false if they cannot be loaded. */
 static bool state_size(json_t *root, vsh_scene *scene, const int32_t size[2]) {
     vsh_run quiet = cli_run;
     vsh_assets_info info;

@@ -28,7 +28,7 @@ typedef struct fit {
     vshi_vec *right, *x;    /* [vertex_count] */
 } fit;
 
-/* Cuts a colour to what a file holds. */
+/* Cuts a colour to 0 … 1, as files hold no others. */
 static vshi_vec cut(vshi_vec v) {
     return (vshi_vec){fmin(fmax(v.x, 0.0), 1.0), fmin(fmax(v.y, 0.0), 1.0), fmin(fmax(v.z, 0.0), 1.0)};
 }
@@ -36,7 +36,7 @@ static vshi_vec cut(vshi_vec v) {
 /* A valid point. Begins as zeros. */
 typedef struct fit_point {
     size_t next, triangle; /* next: number of the point after it */
-    double area;           /* of its part of the triangle */
+    double area;           /* the triangle's, over the number of its points */
     double weight[3];
     vshi_vec value;
 } fit_point;

@@ -788,7 +788,7 @@ static void grade(const vshi_ao_task *task, const int32_t square[2], const tile 
     const double max_error = task->options.max_error, most = BEND * max_error;
     vshi_window_estimate e[TILE * TILE];
     uint16_t places[TILE * TILE];
-    for (uint16_t k = 0; k < TILE * TILE; ++k) { /* those without rays are not looked at */
+    for (uint16_t k = 0; k < TILE * TILE; ++k) { /* nobody reads the estimates of texels without rays */
         places[k] = k;
     }
     vshi_windows_estimate(&t->windows, places, TILE * TILE, max_error, 0, e);
