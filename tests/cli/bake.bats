@@ -86,6 +86,7 @@ terminal() {
         terminal $columns bake "$ASSETS/cloister.glb" --ao 0.6 --max-error 0.005 --size 512 -o out.exr | sed -n 's/^\x1b\[K//; / %/p' >$columns
         awk -v columns=$columns 'length >= columns || /left/ && !begun { exit 1 } { begun = 1 }' $columns || fail "$(cat $columns)"
     done
+    ! terminal 100 bake "$ASSETS/cloister.glb" --ao 0.6 --size 1024 -o out.exr --dry-run | grep '%[a-z]' || fail "results on the bar"
     grep -qE '^vdbshade: \[##* *\] bake [0-9]+ %, about [0-9]+ s left$' 100 || fail "$(cat 100)"
     grep -q '^vdbshade: bake [0-9]* %, about' 30 || fail "$(cat 30)"
     [[ $(terminal 100 info none.obj) == $'\033[31mvdbshade: '* && $(NO_COLOR=1 terminal 100 info none.obj) == vdbshade* &&

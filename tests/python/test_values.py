@@ -54,21 +54,29 @@ class Values(Case):
         for name, (places, corners) in meshes.items():
             lines = [f"v {x:g} {y:g} {z:g}" for x, y, z in places] + [f"f {a} {b} {c}" for a, b, c in corners + 1]
             (self.folder / f"{name}.obj").write_text("\n".join(lines))
-        bakes = []
-        for threads in (1, 2):
-            ground_receives = dict(path=self.folder / "ground.obj", output=self.folder / "lit.gltf", vertex_colors="ao")
-            scene = vdbshade.Scene(casters=[self.folder / f"{name}.obj" for name in meshes], ao=1.0, receivers=[ground_receives])
-            vdbshade.bake_scene(scene, run=vdbshade.Run(threads=threads))
-            bakes.append((self.folder / "lit.bin").read_bytes())
-        self.assertEqual(*bakes)
-        root = json.loads((self.folder / "lit.gltf").read_text())
 
-        def read(name, kind, size):
-            accessor = root["accessors"][root["meshes"][0]["primitives"][0]["attributes"][name]]
-            offset = root["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
-            return numpy.frombuffer(bakes[0], kind, accessor["count"] * size, offset).reshape(-1, size)
-        fitted, (x, _, z) = numpy.zeros((side, side)), (2 * read("POSITION", "<f4", 3).T + 4).astype(int)
-        fitted[x, z] = read("COLOR_0", "<u2", 4)[:, 0] / 65535
+        def bake(receiver="ground.obj", output="lit", threads=1, far=0.0):
+            moved = dict(transform=numpy.array([[1, 0, 0, far], [0, 1, 0, 0], [0, 0, 1, 0.0]]))
+            casters = [dict(path=self.folder / f"{name}.obj", **moved) for name in meshes]
+            lit = dict(path=self.folder / receiver, output=self.folder / f"{output}.gltf", vertex_colors="ao", **moved)
+            vdbshade.bake_scene(vdbshade.Scene(casters=casters, ao=1.0, receivers=[lit]), run=vdbshade.Run(threads=threads))
+            root, bits = json.loads((self.folder / f"{output}.gltf").read_text()), (self.folder / f"{output}.bin").read_bytes()
+
+            def read(name, kind, size):
+                accessor = root["accessors"][root["meshes"][0]["primitives"][0]["attributes"][name]]
+                offset = root["bufferViews"][accessor["bufferView"]].get("byteOffset", 0)
+                return numpy.frombuffer(bits, kind, accessor["count"] * size, offset).reshape(-1, size)
+            return root, read("POSITION", "<f4", 3), read("COLOR_0", "<u2", 4)
+        root, places, colors = bake()
+        self.assertSame(colors, bake(threads=2)[2])
+        self.assertSame(colors, bake(output="far", far=2.0 ** 20)[2])
+        del root["accessors"][root["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"]]["name"]
+        (self.folder / "own.gltf").write_text(json.dumps(root))
+        for receiver, output in (("own.gltf", "first"), ("first.gltf", "second")):  # the first keeps the own colours
+            product = bake(receiver, output)[2]
+            numpy.testing.assert_allclose(product / 65535, (colors / 65535) ** 2, atol=2e-4)
+        fitted, (x, _, z) = numpy.zeros((side, side)), (2 * places.T + 4).astype(int)
+        fitted[x, z] = colors[:, 0] / 65535
         occluders = vdbshade.Occluders([vdbshade.Mesh(numpy.float32(places), numpy.uint32(corners)) for places, corners in meshes.values()])
         ao = lambda places: vdbshade.shade_ao(occluders, places, numpy.tile(numpy.float32([0, 1, 0]), (len(places), 1)), ao_distance=1.0)
         at = points_on_floor(4000)[0]
