@@ -473,7 +473,7 @@ def test_the_light_of_a_lit_glb_is_shown_as_it_was_baked():
     difference = drawn[:, :3] - wanted
     print("largest difference %.2f of 255, RMS %.2f" % (255.0 * abs(difference).max(), 255.0 * math.sqrt((difference ** 2).mean())))
     assert wanted.min() < 0.4 and wanted.max() > 1.4 and abs(difference).max() < 2.0 / 255.0
-    assert "no material has MOZ_lightmap" in error_of(lambda: bpy.ops.vdbshade.import_light(filepath=glb))
+    assert bpy.ops.vdbshade.import_light(filepath=glb) == {"FINISHED"}  # without light, with a warning
 
 
 def test_progress_is_read():

@@ -110,10 +110,12 @@ class VDBSHADE_OT_import_light(bpy.types.Operator, bpy_extras.io_utils.ImportHel
 
     def execute(self, context):
         try:
-            self.report({"INFO"}, "%d materials show their baked light" % import_light(self.filepath))
+            shown = import_light(self.filepath)
         except ERRORS as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
+        self.report({"INFO" if shown else "WARNING"}, "%d materials show their baked light%s" % (
+            shown, "" if shown else ": none has MOZ_lightmap; bake with lights"))
         return {"FINISHED"}
 
 

@@ -4,8 +4,6 @@ import sys
 
 import bpy
 
-from .scene import BakeError
-
 
 class LightImporter:
     """Hooks of Blender's glTF importer. It imports each lightmap as the emission of its material."""
@@ -74,6 +72,4 @@ def import_light(path):
         bpy.ops.import_scene.gltf(filepath=path, import_shading="SMOOTH")
     finally:
         del module.glTF2ImportUserExtension
-    if LightImporter.shown == 0:
-        raise BakeError("'%s': imported without light, as no material has MOZ_lightmap" % path)
     return LightImporter.shown
