@@ -59,8 +59,9 @@ static vsh_result check_vertex_colors(const vsh_scene *scene, const vsh_receiver
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_ARGUMENT,
                            "%s: vertex colours '%.64s': expected ao (with --ao), irradiance (with lights) or "
-                           "shadow.NAME of a light, into a .glb, .gltf or .obj, without tangent space",
-                           receiver->output != NULL ? receiver->output : receiver->path, what);
+                           "a light's shadow.%s, into a .glb, .gltf or .obj, without tangent space",
+                           receiver->output != NULL ? receiver->output : receiver->path, what,
+                           scene->light_count > 0 ? scene->lights[0].name : "NAME");
 }
 
 static vsh_result check_image(const vsh_receiver *receiver, const vsh_image *image, vsh_error *error) {

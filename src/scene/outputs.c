@@ -521,7 +521,7 @@ done:
     return result;
 }
 
-/* Errors between vertices, times max_error, that the noise of points does not reach. */
+/* Errors between vertices, in units of the values' error, that noise alone does not reach. */
 static const double LARGE = 5.0;
 
 /* Fits vertex colours to a page of points, and writes the asset. */
@@ -543,12 +543,17 @@ static vsh_result write_vertex_colors(const vshi_scene_page *page, vsh_error *er
     for (size_t i = 0; i < bake->scene.light_count; ++i) {
         values = strcmp(what, page->channels.names[i]) == 0 ? planes->shadow[i] : values;
     }
+    const double most = bake->scene.shade.max_error;
+    double noise = NAN; /* stays NaN, and nothing is warned of, if methods keep no error */
+    for (size_t i = 0; i < bake->error_count; ++i) {
+        noise = fmax(noise, vsh_bake_error_rmse(&page->baked.errors[i]));
+    }
     vshi_vertex_colors colors;
     vsh_result result;
     VSHI_TRY_DONE(vshi_vertex_colors_fit(page->target->charts, planes->coverage, values, irradiance ? 3 : 1,
                                          &bake->run, &colors, error));
-    lightmap->vertex_error =
-        vshi_warn_vertex_colors(page->target, colors.error, LARGE * bake->scene.shade.max_error, &bake->run);
+    lightmap->vertex_error = vshi_warn_vertex_colors(page->target, colors.error,
+                                                     LARGE * (noise < most ? most : noise), &bake->run);
     result = write_asset(bake, lightmap->receiver, NULL, &colors, error);
 done:
     free(colors.values);

@@ -36,6 +36,9 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     done
     succeed bake "$MODELS/scene_draco.glb" --sun 0.4,0.8,0.3 --vertex-colors irradiance -o lit.glb
     show_gltf lit.glb text | grep '"COLOR_0"' | grep -v KHR_draco | grep -q '"KHR_materials_unlit":{}' || fail "no colours"
+    succeed_saying "too large for the light on them" -- bake "$MODELS/scene_draco.glb" --ao 1 --max-error 0.01 --vertex-colors ao -o lit.glb
+    succeed bake "$MODELS/scene_draco.glb" --ao 1 --ao-method rays --rays 2 --vertex-colors ao -o lit.glb
+    [[ $stderr != *"too large"* ]] || fail "noise of few rays: $stderr"
     succeed bake box.obj "${BAKE[@]}" -o lit.glb
     show_gltf lit.glb text | grep -q '"TEXCOORD_0"' || fail "no UVs"
 }
@@ -53,7 +56,7 @@ BAKE=(--sun 0.4,0.8,0.3 --sun-angle 5 --ao 1 --size 32)
     refuses 2 in.glb "the output is also an input" -- bake in.glb "${BAKE[@]}" -o in.glb
     refuses 2 a.glb AO -- bake in.glb --sky y --size 32 -o a.glb
     refuses 2 a.png "vertex colours 'ao'" -- bake in.glb --ao 1 --vertex-colors ao -o a.png
-    refuses 2 a.glb "vertex colours 'shadow.moon'" -- bake in.glb --sun 0,1,0 --vertex-colors shadow.moon -o a.glb
+    refuses 2 a.glb "vertex colours 'shadow.moon'" "shadow.sun," -- bake in.glb --sun 0,1,0 --vertex-colors shadow.moon -o a.glb
     refuses 2 --size -- bake in.glb --ao 1 --vertex-colors ao --size 8 -o a.glb
     [ "$(files)" = in.glb ] || fail "$(files)"
     echo '{"casters": [{"mesh": "in.glb"}], "lights": [{"name": "sun", "type": "directional", "direction": [0, 1, 0], "color": [9, 9, 9]}],
