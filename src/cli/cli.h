@@ -78,6 +78,9 @@ int cli_cancelled(void);
 enum { CLI_LINE = 1024 };
 extern char cli_last_line[CLI_LINE]; /* the last line printed, without "vdbshade: "; "" at first */
 
+/* Whether standard error is a terminal that knows escape sequences. */
+bool cli_has_escapes(void);
+
 /* Keep a warning until the next cli_print_warnings(), or print it now (--verbose). Any thread. */
 void cli_warn(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void cli_print_warnings(void); /* one line for each kind of warning */

@@ -32,8 +32,7 @@ static void make_plain(char *text, size_t size) {
     }
 }
 
-/* Whether standard error is a terminal that knows escape sequences. */
-static bool has_escapes(void) {
+bool cli_has_escapes(void) {
     const char *term = getenv("TERM");
     return isatty(STDERR_FILENO) != 0 && term != NULL && strcmp(term, "dumb") != 0;
 }
@@ -41,7 +40,7 @@ static bool has_escapes(void) {
 /* Returns the escape sequence if it may be used (https://no-color.org), else "". */
 static const char *use_color(const char *sequence) {
     const char *no_color = getenv("NO_COLOR");
-    return has_escapes() && (no_color == NULL || no_color[0] == '\0') ? sequence : "";
+    return cli_has_escapes() && (no_color == NULL || no_color[0] == '\0') ? sequence : "";
 }
 
 /* Returns the smaller of the terminal's width and COLUMNS; 80 if neither is known. */
@@ -78,7 +77,7 @@ static struct {
 } progress = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
 void cli_begin_progress(bool shown) {
-    progress.terminal = has_escapes();
+    progress.terminal = cli_has_escapes();
     progress.shown = shown && (cli_given.progress || progress.terminal);
     progress.stage[0] = '\0';
 }

@@ -55,7 +55,7 @@ bool cli_interrupted(void) {
  * thread hangs in a write of progress. */
 void cli_signals_tell(void) {
     static const char text[] = "\r\033[Kvdbshade: interrupted\n";
-    const size_t skip = isatty(STDERR_FILENO) ? 0 : strlen("\r\033[K");
+    const size_t skip = cli_has_escapes() ? 0 : strlen("\r\033[K");
     pthread_mutex_lock(&telling);
     if (!told && write(STDERR_FILENO, text + skip, sizeof text - 1 - skip) < 0) {
         /* Nobody can read it. */
@@ -109,7 +109,7 @@ void vshi_memory_refused(size_t bytes) {
     vshi_temporary_remove_own();
     char message[128];
     const int size = snprintf(message, sizeof message, "%svdbshade: the system refused memory, %zu bytes\n",
-                              isatty(STDERR_FILENO) ? "\r\033[K" : "", bytes);
+                              cli_has_escapes() ? "\r\033[K" : "", bytes);
     if (write(STDERR_FILENO, message, (size_t)size) < 0) {
         /* Nobody can read it. */
     }
