@@ -411,7 +411,6 @@ typedef struct cli_stats {
     uint64_t texels, invalid_texels;
     uint64_t points, bad_rows;
     uint64_t voxels, inside_voxels, tiles;
-    int32_t ao_spacing; /* the smallest of all lightmaps; 0: there is no lightmap */
     vsh_shade_stats shade;
     const vsh_bake_error *errors; /* [light_count + 2]: of each light, of AO, of the sky; NULL: unknown */
     const vsh_light *lights;      /* of `errors` */

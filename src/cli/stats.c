@@ -111,8 +111,7 @@ static const char *find_advice(const cli_stats *stats, const vsh_scene *scene, i
                              vsh_get_name(VSH_NAMES_SAMPLER, scene->shade.sampler));
     }
     if (by_rays || stats->methods[kind].traces) {
-        return cli_keep_text("values between rays are interpolated; --max-error %.1g keeps it",
-                             0.5 * stats->max_error);
+        return cli_keep_text("--max-error %.1g keeps it", 0.5 * stats->max_error);
     }
     bool can = false; /* a mesh or a procedural shape, which rays can meet */
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -236,10 +235,6 @@ static int write_file(const cli_stats *stats, const char *path) {
         if (counts[i].of < 0 || counts[i].of == stats->of) {
             json_object_set_new(root, counts[i].name, json_integer((json_int_t)counts[i].value));
         }
-    }
-    if (stats->of == CLI_STATS_TEXELS) {
-        json_object_set_new(root, "ao_spacing",
-                            stats->ao_spacing > 0 ? json_integer(stats->ao_spacing) : json_null());
     }
     add_errors(stats, root);
     json_object_set_new(root, "confined", describe_confinement());

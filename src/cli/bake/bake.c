@@ -307,10 +307,6 @@ static int report_bake(const bake_run *b, const vsh_bake_report *report) {
     cli_stats stats = cli_stats_begin(CLI_STATS_TEXELS);
     stats.texels = report->texels;
     stats.invalid_texels = report->invalid_texels;
-    for (size_t i = 0; i < scene->receiver_count; ++i) {
-        const int32_t spacing = scene->receivers[i].supersample == 1 ? scene->receivers[i].ao_spacing : 1;
-        stats.ao_spacing = i == 0 || spacing < stats.ao_spacing ? spacing : stats.ao_spacing;
-    }
     stats.shade = report->shade;
     stats.errors = report->errors;
     stats.lights = scene->lights;
