@@ -4,6 +4,7 @@
 #include "base/bytes.h"
 #include "base/clock.h"
 #include "base/file.h"
+#include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
 #include "io/image/image.h"
@@ -553,6 +554,7 @@ static vsh_result bake_pages(vshi_scene_bake *bake, vsh_error *error) {
 /* Traces the tiles, or reads them from parts. */
 static vsh_result bake_or_merge(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                                 bool merges, vsh_bake_report *report, vsh_error *error) {
+    VSHI_FLOATS;
     vshi_scene_bake bake;
     int32_t parts = 0;
     vsh_result result;
@@ -671,6 +673,7 @@ static vsh_result try_few_voxels(const vshi_scene_bake *bake, vsh_bake_forecast 
 
 vsh_result vsh_forecast_scene(const vsh_scene *scene, const vsh_bake_options *options, const vsh_run *run,
                               vsh_bake_forecast *forecast, vsh_error *error) {
+    VSHI_FLOATS;
     VSHI_NEEDS_BOTH(scene, forecast);
     vshi_scene_bake bake;
     vsh_bake_forecast f = {.lightmap_count = 0};

@@ -49,6 +49,14 @@ struct Outcome {
     }
 };
 
+vsh_result add_rows(void *user, const vsh_scene_lightmap *, const vsh_image *image, int32_t, int32_t rows,
+                    const float *const *planes, vsh_error *) {
+    for (int32_t c = 0; c < image->channel_count; ++c) {
+        static_cast<Outcome *>(user)->add(planes[c], size_t(image->width) * size_t(rows));
+    }
+    return VSH_OK;
+}
+
 // Everything that reads numbers, computes with them or writes them.
 Outcome work(int32_t threads = 0) {
     Outcome o;
@@ -85,6 +93,10 @@ Outcome work(int32_t threads = 0) {
                              &error),
                 error);
         o.add(values.data(), COUNT);
+        vsh_bake_options bake = vsh_bake_options_default();
+        bake.user = &o;
+        bake.rows = add_rows;
+        o.check(vsh_bake_scene(scene, &bake, &run, nullptr, &error), error);
         vsh_provenance_source source = vsh_provenance_source_default();
         source.scene = scene;
         source.voxel_size = 0.0625;
@@ -239,7 +251,8 @@ int make_files(void **state) {
         " {\"sdf\": {\"shape\": \"plane\", \"half_size\": [1.5, 1.5], \"thickness\": 0.25}}],"
         " \"voxel_size\": 0.0625, \"ao\": {\"distance\": 0.75},"
         " \"lights\": [{\"name\": \"sun\", \"type\": \"directional\", \"direction\": [0.5, 0.75, 0.25],"
-        " \"angle_deg\": 12.5}]}");
+        " \"angle_deg\": 12.5}], \"receivers\": [{\"plane\": {\"size\": [3, 3]}, \"size\": 48, \"output\": "
+        "\"o.exr\"}]}");
     return 0;
 }
 
