@@ -10,7 +10,6 @@ typedef struct render_settings {
     int32_t size[2];
     double fov_deg, orbit_deg, exposure;
     cli_list lightmaps;
-    const char *pack; /* of the lightmaps, as of `bake`; NULL: their own names */
     bool transparent;
 } render_settings;
 
@@ -57,13 +56,10 @@ static const cli_option options[] = {
      CLI_RANGE(NUMBER, render_settings, options.shafts, 0.0, 100.0)},
     {"shaft-steps", "N", "points on a ray where shafts are computed, 1 to 64 (8)",
      CLI_RANGE(INTEGER, render_settings, options.shaft_steps, 1, 64)},
-    {"lightmap", "FILE",
+    {"lightmap", "FILE.exr",
      "show the receiver with this lightmap, whose values replace computed ones; again for the scene's next "
      "receivers",
      CLI_RANGE(LIST, render_settings, lightmaps, 0, MOST_LIGHTMAPS)},
-    {"lightmap-pack", "PACK",
-     "the channels of lightmaps that do not name them, as --pack of bake: \"R=shadow.sun,G=ao\"",
-     CLI_VALUE(TEXT, render_settings, pack)},
     CLI_ACCURACY_OPTIONS,
     CLI_CASTER_OPTIONS,
     CLI_GRID_OPTIONS,
@@ -114,7 +110,6 @@ static int set_options(render_settings *s) {
     CLI_REFUSE_IF(cli_was_given("look-at") && !cli_was_given("camera"), "--look-at: needs --camera X,Y,Z");
     CLI_REFUSE_IF(s->transparent && o->shafts > 0.0,
                   "--background none: not with --shafts, which would cover it");
-    CLI_REFUSE_IF(s->pack != NULL && s->lightmaps.count == 0, "--lightmap-pack: needs --lightmap FILE");
     CLI_REFUSE_IF(o->width > VSH_MAX_PICTURE_SIZE || o->height > VSH_MAX_PICTURE_SIZE,
                   "--size %dx%d: expected at most %d pixels a side", o->width, o->height,
                   VSH_MAX_PICTURE_SIZE);
@@ -128,10 +123,7 @@ static int set_options(render_settings *s) {
 
 typedef struct render_lightmap {
     vsh_image_file *file;
-    vsh_image image;                       /* of these names and planes */
-    const char *names[VSH_MAX_CHANNELS];   /* the file's, or those of --lightmap-pack */
-    const float *planes[VSH_MAX_CHANNELS]; /* linear */
-    float *linear;                         /* R, G and B of an sRGB file; else NULL */
+    vsh_image image; /* a view of it */
 } render_lightmap;
 
 /* Everything in the picture. */
@@ -294,82 +286,6 @@ static int add_casters(const cli_shading *shading, render_shown *shown) {
 
 /* --- lightmaps */
 
-static bool is_srgb(const vsh_image_file *file) {
-    size_t count = 0;
-    const vsh_attribute *attributes = vsh_image_attributes(file, &count);
-    for (size_t i = 0; i < count; ++i) {
-        if (strcmp(attributes[i].name, "vdbshade_color_space") == 0 &&
-            strcmp(attributes[i].value, "sRGB") == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* IEC 61966-2-1. */
-static double decode_srgb(double encoded) {
-    return encoded <= 0.04045 ? encoded / 12.92 : pow((encoded + 0.055) / 1.055, 2.4);
-}
-
-/* Makes R, G and B of an sRGB file linear. */
-static void decode(render_lightmap *map) {
-    static const char rgb[] = "RGB";
-    const size_t texels = (size_t)map->image.width * (size_t)map->image.height;
-    map->linear = malloc(3 * texels * sizeof *map->linear);
-    for (int32_t c = 0; c < map->image.channel_count; ++c) {
-        const char *name = map->names[c],
-                   *at = name[0] != '\0' && name[1] == '\0' ? strchr(rgb, name[0]) : NULL;
-        if (at != NULL) {
-            float *plane = map->linear + (size_t)(at - rgb) * texels;
-            for (size_t i = 0; i < texels; ++i) {
-                plane[i] = (float)decode_srgb((double)map->planes[c][i]);
-            }
-            map->planes[c] = plane;
-        }
-    }
-}
-
-/* Renames the channels R, G, B, A (Y: R) by a pack such as "R=shadow.sun,G=ao". */
-static int unpack(const char *pack, const char *path, render_lightmap *map) {
-    const float *letters[4] = {NULL};
-    static const char rgba[] = "RGBA";
-    for (int32_t c = 0; c < map->image.channel_count; ++c) {
-        const char *name = strcmp(map->names[c], "Y") == 0 ? "R" : map->names[c];
-        const char *at = name[0] != '\0' && name[1] == '\0' ? strchr(rgba, name[0]) : NULL;
-        if (at != NULL) {
-            letters[at - rgba] = map->planes[c];
-        }
-    }
-    map->image.channel_count = 0;
-    for (const char *item = pack + strspn(pack, ","); *item != '\0'; item += strspn(item, ",")) {
-        const int length = (int)strcspn(item, ",");
-        const char *at = strchr(rgba, item[0]);
-        CLI_REFUSE_IF(length < 3 || item[1] != '=' || at == NULL,
-                      "--lightmap-pack '%s': expected R=CHANNEL,G=CHANNEL and so on", pack);
-        CLI_REFUSE_IF(letters[at - rgba] == NULL, "%s: no channel %c, which --lightmap-pack names", path,
-                      item[0]);
-        CLI_REFUSE_IF(map->image.channel_count == VSH_MAX_CHANNELS,
-                      "--lightmap-pack '%s': more than %d channels", pack, VSH_MAX_CHANNELS);
-        map->names[map->image.channel_count] = cli_keep_text("%.*s", length - 2, item + 2);
-        map->planes[map->image.channel_count++] = letters[at - rgba];
-        item += length;
-    }
-    return CLI_OK;
-}
-
-static int read_lightmap(const render_settings *s, const char *path, render_lightmap *map) {
-    CLI_TRY(cli_check(vsh_image_read(path, &cli_run, &map->file, &cli_error)));
-    const vsh_image read = vsh_image_view(map->file);
-    const size_t count = (size_t)read.channel_count;
-    map->image = (vsh_image){read.width, read.height, read.channel_count, map->names, map->planes, NULL};
-    memcpy(map->names, read.names, count * sizeof *map->names);
-    memcpy(map->planes, read.planes, count * sizeof *map->planes);
-    if (is_srgb(map->file)) {
-        decode(map);
-    }
-    return s->pack != NULL ? unpack(s->pack, path, map) : CLI_OK;
-}
-
 /* Returns the caster of a file; NULL if there is none. */
 static const vsh_caster *find_caster(const vsh_scene *scene, const char *path) {
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -391,9 +307,11 @@ static int read_lightmaps(const render_settings *s, const cli_shading *shading, 
     shown->map_count = shown->lit_count = count;
     for (size_t i = 0; i < count; ++i) {
         vsh_lit_meshes *lit = &shown->lit[i];
-        CLI_TRY(read_lightmap(s, s->lightmaps.text[i], &shown->maps[i]));
+        render_lightmap *map = &shown->maps[i];
+        CLI_TRY(cli_check(vsh_image_read(s->lightmaps.text[i], &cli_run, &map->file, &cli_error)));
+        map->image = vsh_image_view(map->file);
         lit->meshes = vsh_assets_receiver(shading->assets, i, &lit->mesh_count);
-        lit->lightmap = &shown->maps[i].image;
+        lit->lightmap = &map->image;
         lit->ambient = scene->has_ambient;
         find_color(find_caster(scene, scene->receivers[i].path), lit->color);
     }
@@ -402,7 +320,6 @@ static int read_lightmaps(const render_settings *s, const cli_shading *shading, 
 
 static void free_shown(render_shown *shown) {
     for (size_t i = 0; i < shown->map_count; ++i) {
-        free(shown->maps[i].linear);
         vsh_image_free(shown->maps[i].file);
     }
     free(shown->maps);
