@@ -127,11 +127,12 @@ typedef void vsh_warning_fn(void *user, const char *message);
 typedef enum vsh_isa {
     VSH_ISA_BEST = 0,  /* the best that this machine has */
     VSH_ISA_BASE = 1,  /* SSE2 on x86-64, Neon on Arm */
-    VSH_ISA_AVX2 = 2,  /* x86-64 only, as the next */
-    VSH_ISA_AVX512 = 3 /* F, DQ and VL */
+    VSH_ISA_AVX2 = 2,  /* x86-64 only */
+    VSH_ISA_AVX512 = 3 /* x86-64 only: AVX-512 F, DQ and VL */
 } vsh_isa;
 
-/* Kinds of names in files and on command lines: VSH_NAMES_SHADOW are the names of VSH_SHADOW_…. */
+/* Kinds of names in files and on command lines: VSH_NAMES_SHADOW selects the names of the VSH_SHADOW_…
+ * constants, and so on. */
 typedef enum vsh_names {
     VSH_NAMES_ISA = 0,
     VSH_NAMES_SHADOW = 1,

@@ -2,7 +2,8 @@
  *
  * A plain RMSE hardly notices lost penumbrae. So there is one measure for each way in which bakes go wrong:
  * wider penumbrae, shifted values, shadows without their casters. docs/pipeline.md has the formulas, their
- * sources, and what each measure cannot see. *
+ * sources, and what each measure cannot see.
+ *
  *     vsh_comparison *comparison;
  *     const vsh_channel_comparison *channel;
  *     vsh_compare_files("golden.exr", "new.exr", NULL, &run, &comparison, &error);
@@ -45,7 +46,7 @@ typedef struct vsh_compare_options {
     size_t struct_size;
     double step;   /* a texel is lost or gained if it differs by this from all values nearby, > 0 … 1 */
     int32_t reach; /* texels along each axis that count as nearby, 0 … 16 */
-    double noise;  /* standard error that sampling makes between the two, 0 … 1: it excuses differences */
+    double noise;  /* standard error that sampling makes between the two, 0 … 1; limits allow for it */
 } vsh_compare_options;
 
 static inline vsh_compare_options vsh_compare_options_default(void) {

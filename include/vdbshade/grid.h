@@ -24,7 +24,8 @@ typedef struct vsh_grid_options {
     size_t struct_size;
     double voxel_size;  /* edge of a voxel, world units, 1e-12 … 1e12; 0: by `resolution` */
     int32_t resolution; /* voxels along the longest side of the bounds, 2 … 65536, if voxel_size is 0 */
-    double half_width;  /* of the narrow band, voxels, 3 … 100. Many triangles lower it, to 12 at least */
+    double half_width;  /* of the narrow band, voxels, 3 … 100. Many triangles lower this limit, but never
+                           below 12 */
     double shell_thickness; /* of sheets and walls, voxels, 1 … 50 */
 } vsh_grid_options;
 
@@ -181,7 +182,7 @@ typedef struct vsh_vdb_entry {
     double background;      /* 0 if values are neither floats nor doubles */
     int32_t index_min[3];   /* box of the active voxels; 0 if there are none */
     int32_t index_max[3];   /* the other corner */
-    uint64_t active_voxels; /* with those of tiles */
+    uint64_t active_voxels; /* including those of tiles */
     uint64_t bytes;         /* in memory */
     char problem[256];      /* why it cannot cast, or what is odd about it; empty: nothing */
     char attributes[8192];  /* metadata that vdbshade wrote: lines "NAME: VALUE", each with a newline */

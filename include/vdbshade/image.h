@@ -17,7 +17,7 @@ VSH_BEGIN_C
 
 enum { VSH_MAX_CHANNELS = 256, VSH_CHANNEL_NAME = 128 };
 
-/* String attribute of EXR files whose R, G and B are a picture of their channels. Its value says of which:
+/* String attribute of EXR files whose R, G and B are a picture of their channels. Its value says which ones:
  * "irradiance", "shadow.sun * ao", "mean of 3 shadows". */
 #define VSH_IMAGE_RGB "vdbshade_rgb"
 

@@ -101,7 +101,8 @@ typedef enum vsh_shadow_method {
     VSH_SHADOW_HARD = 0,      /* the light's centre: 0 or 1 (Hart, "Sphere tracing", 1996) */
     /* min h/(s t), outer penumbra only (Quilez, "soft shadows in raymarched SDFs", 2010) */
     VSH_SHADOW_CLASSIC = 1,
-    /* the same x through 3x² - 2x³, ending at x < 0.004 (Quilez, "outdoors lighting", 2013) */
+    /* CLASSIC's value x becomes 3x² - 2x³, and the march ends at x < 0.004 (Quilez, "outdoors lighting",
+     * 2013) */
     VSH_SHADOW_PRACTICAL = 2,
     VSH_SHADOW_IMPROVED = 3, /* triangulated closest miss, outer penumbra only (Aaltonen, GDC 2018) */
     VSH_SHADOW_SMOOTH = 4,   /* inner and outer penumbra, cubic remap (Quilez, 2018) */
@@ -117,8 +118,8 @@ typedef enum vsh_ao_method {
     VSH_AO_TAPS = 0,  /* five samples along the normal (Quilez, "multiresolution ambient occlusion", 2008) */
     VSH_AO_CONES = 1, /* cosine-weighted cones through the field (Crassin and others, 2011) */
     VSH_AO_RAYS = 2,  /* `rays` cosine-weighted rays, marched through the field */
-    VSH_AO_ADAPTIVE = 3, /* the same, with as many rays as max_error needs */
-    /* the same against the casters' triangles, from the points themselves without start_offset */
+    VSH_AO_ADAPTIVE = 3, /* as RAYS, with as many rays as max_error needs */
+    /* as ADAPTIVE, but against the casters' triangles, from the points themselves without start_offset */
     VSH_AO_EXACT = 4,
     VSH_AO_AUTO = 5 /* exact if the occluders have triangles, else adaptive */
 } vsh_ao_method;
@@ -126,7 +127,7 @@ typedef enum vsh_ao_method {
 /* Traits of methods: bits. */
 typedef enum vsh_method_trait {
     VSH_METHOD_RAYS = 1,        /* casts rays, and knows the error that they leave */
-    VSH_METHOD_KEEPS_ERROR = 2, /* casts as many as max_error needs */
+    VSH_METHOD_KEEPS_ERROR = 2, /* casts as many rays as max_error needs */
     VSH_METHOD_TRIANGLES = 4,   /* needs triangles */
     VSH_METHOD_INNER = 8 /* shadows: knows the inner penumbra, where less than half of the light is visible */
 } vsh_method_trait;
@@ -224,7 +225,7 @@ typedef struct vsh_points {
     const uint32_t *texels;
 } vsh_points;
 
-/* Work counters. Calls add to them, also cancelled ones. Begin with vsh_shade_stats_zero(). */
+/* Work counters. Calls add to them, even cancelled ones. Begin with vsh_shade_stats_zero(). */
 typedef struct vsh_shade_stats {
     size_t struct_size;
     uint64_t marches;       /* cones and rays that were marched */
@@ -238,7 +239,7 @@ typedef struct vsh_shade_stats {
     uint64_t rays;          /* rays marched or traced */
     uint64_t refined;       /* values that needed rays */
     double square_error;    /* adaptive, exact: sum of the values' estimated squared errors */
-    double ao_square_error; /* the part of AO */
+    double ao_square_error; /* AO's part of it */
     double worst_error;     /* adaptive, exact: largest estimated error of a value */
 } vsh_shade_stats;
 
@@ -357,9 +358,10 @@ enum { VSH_QUERY_BATCH = 1 << 20 };
  * shaded along a space-filling curve (Morton, 1966), VSH_QUERY_BATCH at a time with 16 bytes each, because
  * neighbours share proofs and memory.
  *
- * Values of AO, of rays and of shadows by one finished march do not depend on the other points of a call by
- * any bit. Shadows by adaptive and exact do, within their error, as do errors of shadows by rays. Calls
- * with VSH_QUERY_BATCH points each, with the points' numbers as `texels`, give the bits of one call.
+ * The other points of a call change no bit of AO, of shadows by rays, or of shadows by one march that ends
+ * within max_steps. They change shadows by adaptive and exact, and errors of shadows by rays, within their
+ * error. Calls with VSH_QUERY_BATCH points each, with the points' numbers as `texels`, give the bits of one
+ * call.
  *
  * Errors (the arrays are then undefined): VSH_ERROR_ARGUMENT (run, a struct_size, a bad stride, positions of
  * both kinds or of neither, errors without their values, AO without normals), VSH_ERROR_LIMIT (occluders

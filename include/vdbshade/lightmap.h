@@ -84,8 +84,8 @@ typedef struct vsh_atlas_mesh {
 
 /* A chart of an atlas. */
 typedef struct vsh_atlas_chart {
-    uint32_t page;  /* that it lies on, from 0 */
-    uint32_t mesh;  /* that it was cut from */
+    uint32_t page;  /* page that it lies on, from 0 */
+    uint32_t mesh;  /* mesh that it was cut from */
     float stretch;  /* L2 stretch: 1 is isometric (Sander and others, "Texture mapping progressive meshes",
                        2001) */
     int32_t min[2]; /* first column and row of its texels, row 0 at v = 0 */
@@ -99,7 +99,7 @@ typedef struct vsh_atlas_page {
     int32_t height;
     double texels_per_unit; /* of a mesh with density 1 */
     double covered;         /* share of the texels that charts touch, 0 … 1 */
-    uint32_t first_mesh;    /* that has a chart on it */
+    uint32_t first_mesh;    /* first mesh with a chart on it */
 } vsh_atlas_page;
 
 /* Size and quality of an atlas. */
@@ -262,7 +262,7 @@ typedef struct vsh_lightmap {
     float *coverage;   /* 1 if the texel was evaluated and is valid, else 0 */
     /* [light_count] planes: standard error left in each value, not padded; may be NULL */
     float *const *shadow_error;
-    float *ao_error; /* the same of AO. If texels share rays, it is the rays' part; vsh_bake_stats.errors
+    float *ao_error; /* likewise for AO. If texels share rays, it is the rays' part; vsh_bake_stats.errors
                         measures the rest */
     float *bent;     /* [height][width][3]: bent normals, unit */
     /* [light_count] planes [height][width][3]: tinted visibility, linear RGB; may be NULL */
@@ -312,7 +312,7 @@ typedef struct vsh_bake_stats {
     uint64_t texels;           /* covered */
     uint64_t invalid_texels;   /* inside a solid or behind a wall: coverage 0, filled from the nearest valid
                                   texel of the same chart up to 64 texels off, else from the nearest of any
-                                  within the padding (8   texels at least) */
+                                  within the padding (at least 8 texels) */
     uint64_t *invalid_by_mesh; /* [mesh_count]; NULL: not counted */
     vsh_shade_stats shade;     /* added to */
     /* [light_count + 1], with a sky plane [light_count + 2]: of each light, AO and the sky; added to; NULL:
@@ -369,16 +369,15 @@ typedef struct vsh_stitch_report {
     uint64_t places;  /* stitched places on them, half a texel apart */
     uint64_t crowded; /* places left out because a lookup there reads a third chart */
     uint64_t texels;  /* read at these places */
-    double before;    /* root mean square difference across, of all channels; of irradiance relative to its
-                       * largest value
-                       */
-    double after;     /* the same after stitching */
+    double before; /* root mean square difference across the seams, of all channels; for irradiance relative
+                      to its largest value */
+    double after;  /* the same after stitching */
 } vsh_stitch_report;
 
 /* A lightmap among several that are stitched together. */
 typedef struct vsh_stitch_page {
-    const vsh_charts *charts;     /* that the lightmap was baked of */
-    const vsh_lightmap *lightmap; /* whole */
+    const vsh_charts *charts;     /* charts that the lightmap was baked for */
+    const vsh_lightmap *lightmap; /* a whole lightmap, not a part */
 } vsh_stitch_page;
 
 /* Makes bilinear lookups agree on both sides of seams, within and between whole lightmaps with the same

@@ -73,16 +73,16 @@ typedef struct vsh_mesh {
     vsh_alpha_mode alpha;                   /* of its material */
     int32_t one_sided; /* nonzero: light on the backs of its faces passes, as with back-face culling. Methods
                           that march voxels ignore it */
-    const vsh_alpha_mask *mask; /* what cuts it; it then casts as a sheet. NULL: nothing */
+    const vsh_alpha_mask *mask; /* cuts holes into it, so that it casts as a sheet. NULL: no holes */
     const float *mask_uvs; /* [vertex_count][2], texture coordinates for `mask`, v up. Triangles with values
                               that are not finite are opaque */
     const char *material_name; /* may be NULL */
     const uint16_t *indices16; /* instead of `indices`, which must then be NULL */
     /* Bytes from one position to the next, a multiple of 4 up to VSH_MAX_STRIDE; 0: tight. Calls copy arrays
-     * with strides, and 16-bit indices, while they run; charts keep them. Not for vsh_render(). */
+     * with strides, and 16-bit indices, while they run; charts keep their copies. Not for vsh_render(). */
     size_t position_stride;
-    size_t normal_stride; /* the same of normals */
-    size_t uv_stride;     /* the same of UVs */
+    size_t normal_stride; /* likewise for normals */
+    size_t uv_stride;     /* likewise for UVs */
 } vsh_mesh;
 
 /* Findings of vsh_mesh_check(). Vertices at equal positions count as one, so UV seams do not open edges. */
@@ -116,7 +116,7 @@ typedef struct vsh_solidity_report {
     size_t holes;            /* holes of those */
     size_t open_edges;       /* edges around these holes */
     size_t turned_triangles; /* triangles that face against their neighbours, and are turned over */
-    size_t open_solids; /* solids without a side: a house without a floor, a cup. Level sets make sheets of
+    size_t open_solids; /* solids that lack a side: a house without a floor, a cup. Level sets make sheets of
                            them; for rays, points that see only their insides are hidden */
 } vsh_solidity_report;
 
@@ -146,10 +146,10 @@ typedef struct vsh_model vsh_model;
  * - VSH_ERROR_READ: no such file, no permission, no regular file, empty, cut short, damaged; a glTF's buffer
  *   is missing;
  * - VSH_ERROR_UNSUPPORTED: a glTF of another version, or that requires an unknown extension;
- * - VSH_ERROR_INPUT: no ending or an unknown one (.blend, Alembic and USD are named); no triangles; vertices
- *   that are not finite; indices out of range; a damaged header or JSON; a file outside the model's folder
- *   (run->allow_outside);
- * - VSH_ERROR_LIMIT: run->memory_limit (about six bytes for each of the file), nodes nested over 1024 deep;
+ * - VSH_ERROR_INPUT: no ending or an unknown one (the message names .blend, Alembic and USD); no triangles;
+ *   vertices that are not finite; indices out of range; a damaged header or JSON; a file outside the model's
+ *   folder (run->allow_outside);
+ * - VSH_ERROR_LIMIT: run->memory_limit (about six times the size of the file), nodes nested over 1024 deep;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 VSH_API vsh_result vsh_model_read(const char *path, const vsh_run *run, vsh_model **model, vsh_error *error);
 VSH_API void vsh_model_free(vsh_model *model); /* NULL does nothing */
@@ -174,8 +174,8 @@ enum { VSH_MAX_HEIGHTS_SIDE = 65536 };
 
 /* Heights on a regular grid, as a closed solid. A view. In local space y is up. Sample (row, column) is at x
  * = size[0] (column / (columns - 1) - 1/2), z = size[1] (row / (rows - 1) - 1/2), y = height × value: row 0
- * is at -z. Each cell is two triangles, cut from its least row and column to its greatest. Vertical sides
- * reach down to a flat bottom, `base` below the lowest sample. */
+ * is at -z. The diagonal between the two triangles of a cell runs from its lowest row and column to its
+ * highest. Vertical sides reach down to a flat bottom, `base` below the lowest sample. */
 typedef struct vsh_heights_source {
     const char *name;        /* for messages, such as a path; may be NULL */
     int32_t columns;         /* along x, 2 … VSH_MAX_HEIGHTS_SIDE */

@@ -53,8 +53,8 @@ VSH_API vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_coun
                                         const vsh_occluders_options *options, const vsh_run *run,
                                         vsh_occluders **occluders, vsh_error *error);
 
-/* Makes occluders of a level set, which need not outlive the call. Of the options, `reach` and `grown` apply.
- * Time and memory follow the area of the surface. Errors:
+/* Makes occluders of a level set, which need not outlive the call. Only the options `reach` and `grown`
+ * apply. Time and memory follow the area of the surface. Errors:
  * - VSH_ERROR_ARGUMENT: options out of range, run;
  * - VSH_ERROR_INPUT: a grid without a surface;
  * - VSH_ERROR_LIMIT: run->memory_limit; more than 2^31 blocks or 2.9 million bricks of 8³ voxels;
@@ -66,10 +66,10 @@ VSH_API void vsh_occluders_free(vsh_occluders *occluders); /* NULL does nothing 
 /* Size and cost of occluders. */
 typedef struct vsh_occluders_info {
     double voxel_size;  /* world units, of the casters in no layer, else of the first layer; 0: no voxels */
-    int32_t levels;     /* of that pyramid */
+    int32_t levels;     /* of the field with that voxel size */
     size_t layer_count; /* layers that have casters */
     uint64_t active_voxels;   /* of all level sets */
-    uint64_t grid_bytes;      /* memory that these took while occluders were made */
+    uint64_t grid_bytes;      /* memory of the level sets while occluders were made */
     uint64_t bricks;          /* of 8³ cells, of all fields */
     uint64_t field_bytes;     /* memory of all fields */
     uint64_t triangles_bytes; /* memory of triangles and their trees */

@@ -158,8 +158,8 @@ enum { VSH_MAX_VIEW_MODEL = 384 * 1024 * 1024 - 1024 };
 typedef struct vsh_view_bake {
     size_t struct_size;
     const char *model; /* as of vsh_model_read(). A GLB (2.0) goes into the page with its materials and
-                          textures; of others, and of compressed geometry, only triangles, normals and UVs.
-                          NULL, of a second bake: the first one's */
+                          textures; other formats, and compressed geometry, give it only triangles, normals
+                          and UVs. NULL, of a second bake: the first one's */
     /* [plane_count] image files of its channels, one for each page of its lightmap in order */
     const char *const *planes;
     size_t plane_count; /* 0 … VSH_MAX_VIEW_PLANES; 0: the light is in the materials, or missing */
@@ -279,7 +279,7 @@ typedef struct vsh_flat_map {
 /* Bakes the light map of a flat scene. A texel is the mean of its samples outside solids; a texel without any
  * is 0, unless padding reaches it. The third components of a light's direction, axis and position are
  * ignored; its radius is that of a disc, and a spot's angles lie in the plane. A point inside a light's disc
- * sees all of it. Errors (the planes then hold nothing of use):
+ * sees all of it. Errors (the planes are then undefined):
  * - VSH_ERROR_ARGUMENT: scene or map NULL; options out of range; a light that vsh_light_check() refuses or
  *   whose direction has no length in the plane (the message gives its number); a caster of no type; run;
  * - VSH_ERROR_INPUT, VSH_ERROR_READ, VSH_ERROR_UNSUPPORTED: a caster's image, font or text;

@@ -30,10 +30,10 @@ typedef enum vsh_caster_type {
     VSH_CASTER_TEXT = 6         /* text, extruded */
 } vsh_caster_type;
 
-/* Which meshes of a file are meant. A pattern matches a mesh by its name, its object's name, or the part of
- * its name behind its object's ("Wall", "Cube.003" or "Wall/Cube.003" for a node Wall with a mesh Cube.003),
- * as a shell matches: *, ?, [a-c], [!a-c]; \\ quotes. Case counts. "material:PATTERN" matches materials, and
- * so does a pattern that matches no name. All zero: all meshes. */
+/* Selects meshes of a file. A pattern matches a mesh by its name, its object's name, or the part of its name
+ * behind its object's ("Wall", "Cube.003" or "Wall/Cube.003" for a node Wall with a mesh Cube.003), as a
+ * shell matches: *, ?, [a-c], [!a-c]; \\ quotes. Case counts. "material:PATTERN" matches materials, and so
+ * does a pattern that matches no name. All zero: all meshes. */
 typedef struct vsh_selection {
     const char *const *only; /* [only_count]: meshes that match one of these; none: all meshes */
     size_t only_count;
@@ -223,10 +223,10 @@ typedef struct vsh_scene {
     double ambient[3];   /* as in vsh_lightmap */
     vsh_planes planes;   /* further planes to bake */
     int32_t error;       /* nonzero: bake the error left in shadow and AO, if the method knows it */
-    /* [solidity_count], for all mesh casters, over their own; each must match */
+    /* [solidity_count], for all mesh casters, after their own rules; each must match a mesh */
     const vsh_solidity_rule *solidity;
     size_t solidity_count;
-    double unit; /* metres in one unit of mesh files, > 0, instead of what they say; 0: as they say */
+    double unit; /* metres in one unit of mesh files, > 0, overriding the files' own; 0: the files' own */
     int32_t voxels_named; /* nonzero: `grid` has a voxel size or resolution by choice; 0: the bake chooses the
                              voxels */
     int32_t cast_blended; /* nonzero: meshes of blended materials cast where their texture's alpha is 0.5 or
@@ -253,7 +253,7 @@ static inline vsh_scene vsh_scene_default(void) {
  * - as vsh_lights_read();
  * - VSH_ERROR_MEMORY. */
 VSH_API vsh_result vsh_scene_read(const char *path, const vsh_run *run, vsh_scene **scene, vsh_error *error);
-VSH_API void vsh_scene_free(vsh_scene *scene); /* of vsh_scene_read() only; NULL does nothing */
+VSH_API void vsh_scene_free(vsh_scene *scene); /* only a scene of vsh_scene_read(); NULL does nothing */
 
 /* Refuses outputs [output_count] that would replace an input: a file that the scene names, or one that those
  * name (buffers and textures of a glTF, materials of an OBJ), by whatever path or link. Errors:
@@ -304,7 +304,7 @@ typedef struct vsh_setting {
     char range[160];         /* "1 to 4096", "more than 0", names; "": none */
     char otherwise[160];     /* the default: "64"; "": nothing */
     vsh_setting_topic group; /* of help */
-    vsh_setting_owner owner; /* what it belongs to */
+    vsh_setting_owner owner; /* struct that it belongs to */
 } vsh_setting;
 
 /* Gets setting `index`, from 0. Returns 0 beyond the last one, without changing *setting. */
@@ -380,7 +380,7 @@ VSH_API vsh_result vsh_receiver_needs_unwrap(const vsh_receiver *receiver, const
 VSH_API vsh_result vsh_scene_casters(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                                      vsh_grid **grid, vsh_error *error);
 
-/* What occluders of a scene are for. */
+/* Options of a scene's occluders. */
 typedef struct vsh_scene_occluders_options {
     size_t struct_size;
     const double *receivers_min; /* [3], both: world box of the receivers. Fields reach as far as lights and
@@ -449,7 +449,7 @@ static inline vsh_provenance_source vsh_provenance_source_default(void) {
  * - vdbshade_voxel_size;
  * - those of the source;
  * - vdbshade_input_N: "sha256:… NAME" of each input, from 0: the source's files, files of casters and
- *   receivers, and files that those name, each once. Files outside their model's folder need
+ *   receivers, and files that these name, each once. Files outside their model's folder need
  *   run->allow_outside. */
 typedef struct vsh_provenance vsh_provenance;
 

@@ -4,8 +4,8 @@
  *                               ├▶ vsh_bake_…  (lightmaps, volumes)
  *                               └▶ vsh_render  (pictures)
  *
- * The library runs on Linux only. World space is right-handed, in scene units; angles are radians. What holds
- * for every call stands in base.h. A lightmap from arrays of one's own (examples/lightmap.c):
+ * The library runs on Linux only. World space is right-handed, in scene units; angles are radians. base.h has
+ * the rules of all calls. A lightmap from arrays of one's own (examples/lightmap.c):
  *
  *     // The shadow that casters throw on a receiver under a sun of six degrees, into shadow[SIZE * SIZE].
  *     static vsh_result bake(const vsh_mesh *casters, size_t count, const vsh_mesh *receiver, float *shadow,

@@ -99,8 +99,8 @@ static inline vsh_volume_options vsh_volume_options_default(void) {
     return options;
 }
 
-/* Shades voxels at their centres, as vsh_query_points(): in free space without normals, in a band with
- * central differences of the field over half a voxel on each side. Voxels with a negative distance are
+/* Shades voxels at their centres, as vsh_query_points(): without normals in free space; in a band, normals
+ * are central differences of the field over half a voxel on each side. Voxels with a negative distance are
  * inside, and so are those without a normal, between two walls. Values of adaptive and exact agree with
  * single points within their error. Stage: "volume"; `stats` are added to. Free the result with
  * vsh_volume_free(). Errors:
