@@ -38,7 +38,7 @@ static inline uint64_t vshi_bytes_number(const char *at, int size, bool big_endi
     return value;
 }
 
-/* Reads a whole number, perhaps signed; one of 8 bytes is at most INT64_MAX. */
+/* Reads a whole number, signed if `is_signed`. An unsigned one of 8 bytes must be at most INT64_MAX. */
 static inline int64_t vshi_bytes_integer(const char *at, int size, bool is_signed, bool big_endian) {
     const uint64_t bits = vshi_bytes_number(at, size, big_endian), sign = UINT64_C(1) << (8 * size - 1);
     return is_signed && (bits & sign) != 0 ? (int64_t)bits - (int64_t)(2 * sign) : (int64_t)bits;

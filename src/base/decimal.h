@@ -16,9 +16,9 @@ enum { VSHI_DECIMAL_ROOM = 32 }; /* bytes that are enough for any number */
  * or infinity in any case. Returns false if it is not a number. */
 bool vshi_decimal_read(const char *text, const char *end, double *value);
 
-/* Reads a number at the begin of a text, fast: [+-]digits[.digits][e[+-]digits], correctly rounded, infinite
- * if it is too large. Returns its end, or NULL if there is none. A character that cannot belong to a number
- * must follow it. */
+/* Reads the number at the start of a text, fast: [+-]digits[.digits][e[+-]digits], correctly rounded,
+ * infinite if it is too large. Returns its end, or NULL if there is none. A character that cannot belong to a
+ * number must follow it. */
 const char *vshi_decimal_float(const char *text, float *value);
 
 /* Writes the shortest decimal that reads back as `value`, without exponent from 1e-6 to 1e9 (1e15); "nan",

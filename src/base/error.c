@@ -28,8 +28,8 @@ const char *vsh_result_name(vsh_result result) {
     return result >= 0 && result < count ? result_names[result] : "VSH_ERROR_UNKNOWN";
 }
 
-/* Copies a message that is too long without its middle: the path's begin and the reason stay. Characters
- * stay whole. */
+/* Cuts the middle out of a message that is too long, because a path comes first and the reason last. Never
+ * cuts a UTF-8 character in two. */
 static void shorten(vsh_error *error, const char *full, size_t length) {
     static const char ellipsis[] = "…";
     size_t before = 120, after = length - (sizeof error->message - 1 - before - (sizeof ellipsis - 1));

@@ -25,7 +25,7 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
 /* Fails with VSH_ERROR_MEMORY: the system refused memory for `what`. */
 VSHI_SHARED vsh_result vshi_fail_memory(vsh_error *error, const char *what);
 
-/* Returns from a function of the API with VSH_ERROR_ARGUMENT in its `error`, if the pointer is NULL. */
+/* If a pointer is NULL, makes the public function around it fail with VSH_ERROR_ARGUMENT. */
 #define VSHI_NEEDS(pointer)                                                                                  \
     do {                                                                                                     \
         if ((pointer) == NULL) {                                                                             \

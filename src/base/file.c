@@ -66,7 +66,7 @@ static size_t name_temporary(const char *target, long process, int number, char 
     return length + 2;
 }
 
-/* Returns whether this process has the lock now. Without locks of the file system, nobody else has it. */
+/* Returns whether this process may use the file: it got the lock, or the file system has no locks. */
 static bool lock(int file) {
     return flock(file, LOCK_EX | LOCK_NB) == 0 || (errno != EWOULDBLOCK && errno != EINTR);
 }

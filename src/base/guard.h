@@ -17,7 +17,7 @@ struct Failure {
     vsh_error error{};
 };
 
-// Calls a C function whose last parameter is an error, which this adds; throws that error.
+// Calls a C function and throws its error. The error is its last parameter, which callers here leave out.
 template <typename Function, typename... Arguments>
 void require(Function *function, const Arguments &...arguments) {
     Failure failure;

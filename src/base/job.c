@@ -183,7 +183,7 @@ vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, 
     }
     size_t given_size;
     memcpy(&given_size, given, sizeof given_size);
-    /* other sizes than multiples of the first member's would cut a pointer in two */
+    /* a size that is no multiple of size_t would cut a pointer in two */
     if (given_size <= sizeof given_size || given_size > size || given_size % sizeof given_size != 0) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "%s: struct_size %zu, expected %zu; fill it with its default function", what,

@@ -13,7 +13,7 @@ typedef struct vshi_job vshi_job;
  * memory is short. */
 VSHI_SHARED vshi_job *vshi_job_begin(const vsh_run *run, const char *stage, size_t total);
 
-/* The same with an error that names `what`: VSH_ERROR_MEMORY. */
+/* Begins a job in the same way, but fails with VSH_ERROR_MEMORY, naming `what`. */
 VSHI_SHARED vsh_result vshi_job_open(vshi_job **job, const vsh_run *run, const char *stage, size_t total,
                                      const char *what, vsh_error *error);
 VSHI_SHARED void vshi_job_end(vshi_job *job); /* NULL does nothing */
@@ -27,8 +27,8 @@ VSHI_SHARED bool vshi_job_cancelled(const vshi_job *job);
 /* The run's threads, 1 … 1024, or 0 for all cores; fewer, with a note, if the system refuses some. */
 VSHI_SHARED int32_t vshi_job_threads(const vshi_job *job);
 
-/* Fails with VSH_ERROR_CANCELLED, naming the stage: always; if the job is cancelled; if it is cancelled after
- * an advance. */
+/* These fail with VSH_ERROR_CANCELLED, naming the stage. The first always does; the second if the job is
+ * cancelled; the third advances the job, and fails if it is then cancelled. */
 VSHI_SHARED vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *error);
 VSHI_SHARED vsh_result vshi_job_check(const vshi_job *job, vsh_error *error);
 VSHI_SHARED vsh_result vshi_job_step(vshi_job *job, size_t units, vsh_error *error);
@@ -36,7 +36,7 @@ VSHI_SHARED vsh_result vshi_job_step(vshi_job *job, size_t units, vsh_error *err
 /* Checks run (may be NULL) and copies it over defaults into *full. Errors: VSH_ERROR_ARGUMENT. */
 VSHI_SHARED vsh_result vshi_run_resolve(const vsh_run *run, vsh_run *full, vsh_error *error);
 
-/* Sends one line to run->warning, if it is set: it tells what changes the result, and what helps. */
+/* Sends one line to run->warning, if it is set. A warning says how the result suffers, and what to do. */
 VSHI_SHARED void vshi_warn(const vsh_run *run, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
 /* Sends VSHI_NOTE and a line that needs no action, if run->notes is set. */
@@ -45,8 +45,8 @@ VSHI_SHARED void vshi_note(const vsh_run *run, const char *format, ...) __attrib
 VSHI_SHARED bool vshi_wants_notes(const vsh_run *run);
 
 /* Copies a versioned struct, whose first member is its size, over *defaults. Errors: VSH_ERROR_ARGUMENT,
- * naming `what`, if the size is that of no version: it holds more than one member, is at most `size`, and a
- * multiple of size_t's. */
+ * naming `what`, if no version of the struct has that size: sizes are multiples of size_t's, larger than it,
+ * and at most `size`. */
 VSHI_SHARED vsh_result vshi_options_resolve(const void *given, void *defaults, size_t size, const char *what,
                                             vsh_error *error);
 

@@ -12,15 +12,15 @@ VSH_BEGIN_C
  * VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_allocate(void **memory, size_t count, size_t size, const char *what, vsh_error *error);
 
-/* Allocates `count` elements for a pointer in the same way. */
+/* Allocates `count` elements of the type that a pointer points to, as vshi_allocate(). */
 #define VSHI_ALLOCATE(pointer, count, what, error)                                                           \
     vshi_allocate((void **)&(pointer), (count), sizeof *(pointer), (what), (error))
 
 /* Copies a text into new memory. Errors: VSH_ERROR_MEMORY, naming `what`. */
 vsh_result vshi_copy_text(char **copy, const char *text, const char *what, vsh_error *error);
 
-/* An array for VSHI_ALLOCATE_ALL(arrays, what, error), which calls vshi_allocate() for each of a list, up to
- * the first failure. The caller frees them. */
+/* An array to allocate. VSHI_ALLOCATE_ALL(arrays, what, error) calls vshi_allocate() for each array of a
+ * list, up to the first failure. The caller frees them. */
 typedef struct vshi_array {
     void **memory;
     size_t count, size;
@@ -31,7 +31,7 @@ vsh_result vshi_allocate_all(const vshi_array *arrays, size_t count, const char 
 #define VSHI_ALLOCATE_ALL(arrays, what, error)                                                               \
     vshi_allocate_all(arrays, sizeof(arrays) / sizeof *(arrays), what, error)
 
-/* The same in one block, which free() of the first array frees. The pointers are NULL after a failure. */
+/* Allocates all arrays in one block: free() the first one only. After a failure all pointers are NULL. */
 vsh_result vshi_allocate_block(const vshi_array *arrays, size_t count, const char *what, vsh_error *error);
 #define VSHI_ALLOCATE_BLOCK(arrays, what, error)                                                             \
     vshi_allocate_block(arrays, sizeof(arrays) / sizeof *(arrays), what, error)
@@ -51,8 +51,8 @@ VSHI_SHARED uint64_t vshi_peak_bytes(void);
 /* Returns the run's memory limit without run->memory_held, at least a byte; 0: there is no limit. */
 uint64_t vshi_memory_left(const vsh_run *run);
 
-/* Ends a program with base/guarded_malloc.c after the system refused a block of `bytes`. Each of those
- * programs defines it, without memory or locks. */
+/* Each program with base/guarded_malloc.c defines this: it ends the program after the system refused a block
+ * of `bytes`. It must not allocate or lock. */
 void vshi_memory_refused(size_t bytes) __attribute__((noreturn));
 
 /* --- stores: arrays as large as a lightmap. An array lies in a file without a name if seven eighths of the

@@ -23,8 +23,8 @@ vsh_result vshi_parallel_for(vshi_job *job, size_t count, size_t grain, size_t u
 /* Handles one element, and may fail. May run on any thread. */
 typedef vsh_result vshi_element_fn(void *user, size_t index, vsh_error *error);
 
-/* Does the same for elements that may fail. Handles all of them, and reports the error of the lowest that
- * failed. Errors: as vshi_parallel_for() and fn. */
+/* Calls fn for each element, like vshi_parallel_for(). Handles all of them even if some fail, and then
+ * reports the error of the lowest. Errors: as vshi_parallel_for() and fn. */
 vsh_result vshi_parallel_each(vshi_job *job, size_t count, size_t grain, size_t units, vshi_element_fn *fn,
                               void *user, vsh_error *error);
 

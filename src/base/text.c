@@ -212,7 +212,7 @@ bool vshi_attributes_add(vshi_attributes *a, const char *name, const char *value
 
 void vshi_attributes_free(vshi_attributes *a) {
     for (size_t i = 0; i < a->count; ++i) {
-        free((void *)(uintptr_t)a->list[i].name); /* and the value behind it */
+        free((void *)(uintptr_t)a->list[i].name); /* its block also holds the value */
     }
     free(a->list);
     *a = (vshi_attributes){NULL, 0, 0};

@@ -20,7 +20,7 @@ static pthread_mutex_t trying = PTHREAD_MUTEX_INITIALIZER;
 static _Atomic int32_t known; /* threads that the system gave */
 static bool refused;          /* the system refused one; guarded by `trying` */
 
-/* Threads that are tried wait for this, so that all of them live at once. */
+/* Held while try() creates threads. They wait for it, so that all of them live at once. */
 static pthread_mutex_t gate = PTHREAD_MUTEX_INITIALIZER;
 
 static void *wait_at_gate(void *unused) {

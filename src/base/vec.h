@@ -179,7 +179,7 @@ static inline vshi_vec vshi_triangle_point(const vshi_vec corner[3], double u, d
 }
 
 /* Limits the part from … to of a ray to low … high along one axis; a part without a point has to < from.
- * Comparisons, as fmin() and fmax() are calls for the sake of NaN. */
+ * Compares instead of calling fmin() and fmax(), which handle NaN and are not inlined. */
 static inline void vshi_clip_axis(double origin, double along, double low, double high, double *from,
                                   double *to) {
     if (along == 0.0) {

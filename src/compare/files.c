@@ -263,7 +263,7 @@ static void set_coverage(vsh_channel_comparison *channel, const vsh_coverage *co
     channel->coverage_failed = coverage->share > channel->coverage_limit;
 }
 
-/* Measures and judges a channel. The caller holds its values already. */
+/* Measures and judges a channel. The run's memory_held already counts its values. */
 static vsh_result measure(const files *f, vsh_channel_comparison *channel, const vsh_compared *compared,
                           vsh_error *error) {
     vsh_run run = f->run;

@@ -27,7 +27,7 @@ enum { FEWEST_EDGES = 16 }; /* fewer do not make a mean */
 
 static const double LOW = 0.1, HIGH = 0.9;
 static const double ROOM = 0.02;        /* move of the marks that tests if a width is steady */
-static const double MOST_ROOM = 0.3;    /* of the range, that each mark moves */
+static const double MOST_ROOM = 0.3;    /* share of the range that each mark moves at most */
 static const double LEAST_RANGE = 0.05; /* from the darkest to the lightest: less is no shadow */
 static const double REACH = 2.0;        /* texels that narrow edges of a pair may be apart */
 
@@ -35,7 +35,7 @@ typedef struct edge {
     double at;    /* texels along the line */
     double width; /* across the edge */
     int rises;    /* 1: dark to light; -1 */
-    bool own;     /* this axis is the nearest to its gradient */
+    bool own;     /* the line's axis is the nearest to its gradient */
     bool steady;  /* its width hardly depends on the marks */
     size_t near;  /* index of the nearest of the others; SIZE_MAX: none */
 } edge;
@@ -100,11 +100,11 @@ static edge measure_edge(const line *l, int which, size_t begin, size_t end) {
     const double even =
         (l->closer.high - l->closer.low) / (m.high - m.low); /* share that is left on an even slope */
     e.steady = closer >= width * (2.0 * even - 1.0);
-    const double share = lit / (m.high - m.low); /* texels beyond a rising edge */
+    const double share = lit / (m.high - m.low); /* lit texels, with fractions */
     e.at = e.rises > 0 ? (double)end - share : (double)begin + share;
     double along = 0.0, squares = 0.0, widest = 0.0;
     for (int axis = 0; axis < 3; ++axis) {
-        double sum = 0.0; /* trapezia along the line, as across it: errors cancel */
+        double sum = 0.0; /* by the trapezium rule for each axis, so that its errors cancel */
         for (size_t i = begin; i <= end && l->pair->size[axis] > 1; ++i) {
             sum += (i == begin || i == end ? 0.5 : 1.0) * find_slope(l, which, i, axis);
         }
@@ -172,7 +172,7 @@ static void add_line(const line *l, edge *golden, edge *fresh, tally *t) {
     find_nearest(fresh, fresh_count, golden, golden_count);
     for (size_t i = 0; i < golden_count; ++i) {
         const edge *one = &golden[i], *other = one->near != SIZE_MAX ? &fresh[one->near] : NULL;
-        /* near a diagonal the axis may be one edge's own and not the other's */
+        /* near a diagonal, the nearest axes of the two edges' gradients may differ */
         if (other != NULL && other->near == i && (one->own || other->own) && one->steady && other->steady) {
             ++t->pairs;
             t->width[VSHI_GOLDEN] += one->width;
@@ -212,7 +212,7 @@ static bool find_sides(const vshi_pair *pair, double noise, line *l) {
     return range >= LEAST_RANGE; /* -inf if there are too few values */
 }
 
-/* Whether value `i` is the first of a line along the axis, which `l` then is. */
+/* Starts line `l` at value `i`. Returns whether that is the first value of a line along the axis. */
 static bool begins_line(line *l, size_t i) {
     l->first = i;
     return i / l->stride % l->count == 0;

@@ -8,9 +8,10 @@
  * eigenvectors of golden's structure tensor (Förstner and Gülch 1987) with large eigenvalues: the shortest
  * shift that fits.
  *
- * Penumbrae of another width and missing shadows are even about their edges and cancel. A shift counts only
- * if undoing it removes a quarter of the squared difference. Values that would come from outside are not
- * explained. Limits: it finds shifts within the width of the penumbrae, and up to MOST_SHIFT texels. */
+ * Penumbrae of another width and missing shadows are even about their edges and cancel. A shift counts
+ * only if undoing it removes a quarter of the squared difference. Values that would come from outside the
+ * image do not count as explained. Limits: it finds shifts within the width of the penumbrae, and up to
+ * MOST_SHIFT texels. */
 #include "compare/compare.h"
 
 #include <math.h>
@@ -21,10 +22,10 @@ enum { SWEEPS = 8 }; /* of Jacobi's method; five are enough for 3 × 3 */
 static const double MOST_SHIFT = 8.0;  /* texels: beyond it, the values have nothing in common */
 static const double SMALL_STEP = 1e-3; /* texels: then it has converged */
 static const double LEAST_EXPLAINED = 0.25;
-static const double NOTHING = 0.01; /* added to sums of squared slopes: weaker edges decide nothing */
+static const double NOTHING = 0.01; /* added to sums of squared slopes, so that weaker edges decide nothing */
 
-/* Share of the largest eigenvalue. The stairs of a hard straight edge reach 0.055 (at slope 0.3), and those
- * of an edge one texel wide 0.002. */
+/* Directions with a smaller share of the largest eigenvalue do not count. The stairs of a hard straight edge
+ * reach 0.055 (at slope 0.3), and those of an edge one texel wide 0.002. */
 static const double LEAST_DETERMINED = 0.07;
 
 typedef struct registration {

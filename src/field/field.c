@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Voxel of a field of one value, finest voxels. */
+/* Voxel size of a field that has one value everywhere, finest voxels. */
 #define CONSTANT_SCALE 0x1p60f
 
 /* Default reach, diagonals of the bounds: enough for a light of 60° at receivers several diagonals away. */
@@ -184,7 +184,7 @@ done:
 vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error) {
     VSHI_TRY(create_constant(voxel_size, VSHI_COARSE_BAND * CONSTANT_SCALE, true, field, error));
     for (int axis = 0; axis < 3; ++axis) {
-        (*field)->bounds_min[axis] = INFINITY; /* which no cone meets */
+        (*field)->bounds_min[axis] = INFINITY; /* an empty box, which no cone meets */
         (*field)->bounds_max[axis] = -INFINITY;
     }
     return VSH_OK;
@@ -197,7 +197,7 @@ vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], con
     vsh_field *f = *field;
     f->unknown = true;
     for (int axis = 0; axis < 3; ++axis) {
-        /* around 0, as positions become floats, like a level set of the same casters */
+        /* centred on 0, like a level set of the same casters, because positions become floats */
         const double middle = round((low[axis] + 0.5 * (high[axis] - low[axis])) / voxel_size);
         f->to_field[4 * axis + 3] = -middle;
         f->world_min[axis] = low[axis];
@@ -208,8 +208,8 @@ vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], con
     return VSH_OK;
 }
 
-/* Gradients come from a level whose band exceeds the distance by this much, its voxels: corners clamped to
- * the band would turn the gradient. */
+/* Closer to the end of a level's band than this, voxels of the level, the next level gives the gradient:
+ * corners that are clamped to the band would turn it. */
 static const float GRADIENT_ROOM = 1.0f;
 
 static void level_gradient(const vsh_field *field, int32_t l, const float p[3], float gradient[3]) {

@@ -21,9 +21,9 @@ typedef struct vshi_field_options {
     double reach;    /* largest distance from a surface that the field resolves, world units, finite. 0: four
                       * times the diagonal of the solid's box */
     int32_t surface; /* nonzero: extract the surface of the finest level, if the library has Embree. Adaptive
-                      * then traces its rays against it instead of marching. Values are as near to the
-                      * casters, not the same. Pays from about two rays an active voxel on, and costs some 30
-                      * bytes an active voxel */
+                        then traces its rays against it instead of marching. Values are as accurate as marched
+                        ones, but not equal to them. Pays from about two rays an active voxel on, and costs
+                        some 30 bytes an active voxel */
     double grown; /* voxels by which casters grow for rays, 0 … 1. A trilinear sample over a convex edge is
                    * too large, by up to 0.44 voxels, so voxelised casters seem smaller than they are. 0: the
                    * voxels define the caster, as those of a file do */
@@ -203,8 +203,8 @@ static inline float vshi_field_distance(const vsh_field *field, const float p[3]
     return h;
 }
 
-/* The same for marching: beyond the finest band |distance| is a lower bound. `gradient`, if not NULL, points
- * to where the distance grows; zero beyond the reach. */
+/* Signed distance for marching: like vshi_field_distance(), but beyond the finest band |distance| is a lower
+ * bound. `gradient`, if not NULL, points to where the distance grows; zero beyond the reach. */
 float vshi_field_lower_bound(const vsh_field *field, const float p[3], float gradient[3]);
 
 /* World position to field space, in double precision. */
@@ -212,7 +212,8 @@ static inline vshi_vec vshi_to_field(const vsh_field *field, const double positi
     return vshi_transform_point(field->to_field, vshi_vec_of(position));
 }
 
-/* The inverse: to_field is a rotation over the voxel size, so this is its transpose times the square. */
+/* Field space to world. to_field is a rotation divided by the voxel size, so its inverse is its transpose
+ * times the voxel size squared. */
 static inline vshi_vec vshi_direction_to_world(const vsh_field *field, vshi_vec d) {
     const double *m = field->to_field;
     return vshi_unit((vshi_vec){m[0] * d.x + m[4] * d.y + m[8] * d.z, m[1] * d.x + m[5] * d.y + m[9] * d.z,
@@ -227,8 +228,8 @@ static inline vshi_vec vshi_to_world(const vsh_field *field, vshi_vec p) {
                       square);
 }
 
-/* Makes a field without casters, in which everything is free. Start offsets are in its voxel size, world
- * units, 1e-12 … 1e12. Distances are a lower bound beyond all reach; its bounds are 0. Free it with
+/* Makes a field without casters, in which everything is free. Start offsets count its voxels, whose size is
+ * in world units, 1e-12 … 1e12. Distances exceed all reach, and the bounds are an empty box. Free it with
  * vshi_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_field_create_empty(double voxel_size, vsh_field **field, vsh_error *error);
 
@@ -236,15 +237,15 @@ static inline bool vshi_field_is_empty(const vsh_field *field) {
     return field->bounds_min[0] > field->bounds_max[0];
 }
 
-/* Makes a field for casters that are traced only: their box, and distances of 0 everywhere, which prove
- * nothing. Lengths are in voxels of the given size, world units, 1e-12 … 1e12. Free it with
- * vshi_field_free(). Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+/* Makes a field for casters that are only traced. It has their box, and distances of 0, which prove nothing.
+ * Lengths are in voxels of the given size, world units, 1e-12 … 1e12. Free it with vshi_field_free(). Errors:
+ * VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_field_create_unknown(double voxel_size, const double low[3], const double high[3],
                                      vsh_field **field, vsh_error *error);
 
 /* --- memory */
 
-/* The memory limit, and the memory in use: the grid, the field so far, the caller's arrays. */
+/* A run with its memory limit, and the memory in use: the grid, the field so far, the caller's arrays. */
 typedef struct vshi_field_budget {
     const vsh_run *run;
     double held; /* bytes */
@@ -268,9 +269,9 @@ static inline double vshi_field_bytes(const vsh_field *field) {
  * (Nielson and Hamann, "The asymptotic decider", 1991). Bricks share no corners, but corners that meet are
  * equal to the bit. */
 
-/* Makes field->surface, the surface at field->grown, for rays; NULL if no value is so low. `budget` counts
- * all memory except for the surface's. Errors: as vshi_surface_quads_make(); VSH_ERROR_UNSUPPORTED if Embree
- * cannot be loaded. */
+/* Makes field->surface, the surface at field->grown, for rays. NULL if no value of the field is as low as
+ * that. `budget` counts all memory except for the surface's. Errors: as vshi_surface_quads_make();
+ * VSH_ERROR_UNSUPPORTED if Embree cannot be loaded. */
 vsh_result vshi_field_add_surface(vsh_field *field, vshi_field_budget budget, vshi_job *job,
                                   vsh_error *error);
 

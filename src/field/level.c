@@ -529,8 +529,8 @@ static void copy_core(void *user, size_t begin, size_t end) {
  * these feet slides along the finest level's surface until it faces the voxel. That removes the error of the
  * lattice's spacing. */
 
-/* Most that two slides of a voxel each bring a foot nearer that is a band away, voxels of its level: 2² / (2
- * · 6), and half a finest voxel of residue. */
+/* Most that slide() shortens the way to a foot at the end of the band, voxels of the level: 2² / (2 · 6) by
+ * two slides of a voxel each, and half a finest voxel of residue. */
 static const float SLIDE_GAIN = 0.6f;
 
 /* Finds the numbers of a block and of the 26 around it; -1: none. */
@@ -639,7 +639,7 @@ static void settle(derivation *d, size_t block, const bits open) {
             }
             int16_t *const value = d->blocks.values + block * BLOCK + v;
             const float sign = *value < 0 ? -1.0f : 1.0f, residue = slide(d->field, scale, p, foot);
-            /* a foot just outside the surface is nearer to a p outside than the surface, by its residue */
+            /* the foot lies off the surface by its residue, so the distance is wrong by as much */
             const float distance =
                 distance_to(p, foot) + sign * (fabsf(residue) < MAX_RESIDUE ? residue : 0.0f);
             if (distance < d->blocks.band) {

@@ -64,7 +64,7 @@ static void find_pair(double at, int32_t size, int32_t wrap, size_t pair[2]) {
     pair[1] = (size_t)wrap_index(at + 1.0, size, wrap);
 }
 
-/* Applies the base's factor to an alpha of 255. */
+/* Whether an alpha of 0 … 255, times the material's base alpha, reaches the cutoff. */
 static bool is_opaque(const vsh_alpha_mask *mask, double alpha) {
     return mask->base_alpha * alpha >= 255.0 * mask->alpha_cutoff;
 }

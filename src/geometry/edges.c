@@ -126,7 +126,7 @@ typedef struct finding {
     uint32_t *corners; /* [triangle_count][3]: welded, in the world's order */
     vshi_sorted_sides sides;
     use *uses;       /* [most sides of an edge] */
-    spoke *spokes;   /* the same */
+    spoke *spokes;   /* [most sides of an edge] */
     size_t odd;      /* edges of three, five, … triangles */
     uint8_t *frayed; /* [triangle_count]; set by find_frayed() */
     uint32_t *queue; /* [triangle_count] */

@@ -33,11 +33,11 @@ static inline size_t vshi_mesh_object_size(const vsh_mesh *meshes, size_t first,
 }
 
 /* Checks a mesh as vsh_mesh_check() does. A function that gets meshes from a caller calls this first, or
- * makes a set of them (mesh_set.h). A mesh that is known to pass costs nothing. `index` is the mesh's
- * place in a list, for messages. */
+ * makes a set of them (mesh_set.h). A mesh that has passed before costs nothing. `index` is the mesh's place
+ * in a list, for messages. */
 vsh_result vshi_mesh_check_data(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
-/* The same, without the knowledge of earlier checks. Refuses strides and 16-bit indices. */
+/* Checks a mesh even if it has passed before. Refuses strides and 16-bit indices. */
 vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error);
 
 /* Meshes without strides and 16-bit indices: the caller's own, or copies in `memory`. */

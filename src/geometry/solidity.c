@@ -30,11 +30,13 @@ static inline uint8_t *turned_of(const vshi_solidity *s, const vshi_component *c
  * without its lid 0.90, half a sphere 0.82, a short tube 0.79, a tent 0.64, a curtain 0.60. A cup that is
  * filled by mistake buries its content, so the limit is above it. */
 static const double SOLID_ENCLOSES = 0.945;
-/* The same if it looks inwards: its faces get a thin wall only, so a room may lack a whole side. */
+/* Least share that a surface which looks inwards must enclose. Its faces only get a thin wall, so a room may
+ * lack a whole side. */
 static const double WALL_ENCLOSES = 0.86;
 /* Least share of the area that must look inwards. If faces disagree more, a closed component is solid. */
 static const double INWARD_SHARE = 2.0 / 3.0;
-/* Least volume over the area to the power of 1.5: rounding of no volume is less, a sphere has 0.094. */
+/* Least volume, as a share of the area to the power of 1.5. Rounding makes less out of no volume; a sphere
+ * has 0.094. */
 static const double LEAST_VOLUME = 1e-6;
 /* Share of the area that has a duplicate facing the other way: such faces are double-sided sheets. */
 static const double DOUBLED_SHARE = 0.5;
@@ -320,8 +322,9 @@ done:
 
 enum { SAMPLES = 24, AROUND_SAMPLES = 8, DOME_ANGLES = 1 << 24 };
 
-/* Shares of a room's samples. With the first in any solids it is a room. With the second in one solid it is
- * cut out of that one; a pillar that only reaches into the wall is not. */
+/* Shares of the samples of a component that looks inwards. It is a room if solids contain ROOM_SHARE of them.
+ * It is cut out of each solid that contains CUT_SHARE; a pillar that only reaches into the wall contains
+ * fewer. */
 static const double ROOM_SHARE = 0.5, CUT_SHARE = 0.25;
 /* A sample whose winding number is nearer to 1/2 than this lies on the surface. */
 static const double ON_SURFACE = 0.25;
@@ -428,8 +431,8 @@ static size_t count_within(const vshi_solidity *s, const vshi_component *solid, 
     return within;
 }
 
-/* The content of a dome is smaller than this share of it, or is not all solids. Eyes in a head and an engine
- * in its hood are solids, and about as large. */
+/* The content of a dome is shorter than this share of the dome's longest side, or not all solid. Eyes in a
+ * head and an engine in its hood are solids, and about as large. */
 static const double DOME_SHARE = 0.5;
 
 static double longest(vshi_vec size) {
@@ -515,7 +518,7 @@ static vsh_result find_rooms(vshi_solidity *s, vsh_error *error) {
 
 /* Peak memory for a triangle and for a vertex. */
 static const double BYTES_PER_TRIANGLE = 120.0, BYTES_PER_VERTEX = 24.0;
-/* The same for terrains, whose edges are known. */
+/* Terrains need less, because their edges are known. */
 static const double TERRAIN_BYTES_PER_TRIANGLE = 9.0, TERRAIN_BYTES_PER_VERTEX = 4.0;
 
 /* --- objects joined from their parts */

@@ -119,8 +119,8 @@ static inline double vshi_light_end(const vshi_light_view *view) {
     return isfinite(view->distance) ? view->distance * (1.0 - view->sine * view->sine) : INFINITY;
 }
 
-/* Finds the light's view. It is set only if the light is seen. `hard` changes no disc: callers who want one
- * without size use a sine of 0. */
+/* Finds the light's view. It is set only if the light is seen. `hard` does not apply to discs: callers who
+ * want one without size use a sine of 0. */
 static inline vshi_light_side vshi_light_look(const vshi_light_place *place, vshi_vec from, bool hard,
                                               vshi_light_view *view) {
     if (place->shape != NULL) {
@@ -210,7 +210,7 @@ typedef struct vshi_light_member {
     double lowest, highest; /* an excluded infinity allows any finite value */
     bool above, below;      /* whether `lowest` and `highest` are excluded */
     bool nonzero;           /* of vectors: not all numbers may be 0 */
-    bool half;              /* of angles: files have half of it */
+    bool half;              /* of angles: files give half the angle */
     bool apart;             /* the type's check() checks the range, which depends on another member */
 } vshi_light_member;
 

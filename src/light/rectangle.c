@@ -19,7 +19,7 @@ static const double LEAST_FACTOR = 0x1p-20;
 /* Rays omit this part of the way, so that a surface under the light does not hide it. */
 static const double HAIR = 0x1p-14;
 
-/* Cones whose rim has a smaller cosine hold too much for proofs. */
+/* Proofs leave out cones whose rim has a smaller cosine: such wide cones hardly ever prove anything. */
 static const double WIDEST = 0.09;
 
 /* Proofs use cones wider by this part, against rounding. */
@@ -181,7 +181,7 @@ static double mix(const double ends[2], double part) {
 }
 
 static double clamp(double value, const double ends[2]) {
-    return fmin(fmax(value, ends[0]), ends[1]); /* of NaN the first */
+    return fmin(fmax(value, ends[0]), ends[1]); /* NaN becomes ends[0] */
 }
 
 /* Finds a place on the rectangle, uniform in solid angle. */

@@ -235,8 +235,8 @@ static vsh_result add_model(page *p, const char *path, json_t *about, vsh_error 
     return result;
 }
 
-/* --- planes of a bake: halves, their high bytes before their low ones, each less its left neighbour, by
- * deflate */
+/* --- planes of a bake: halves, all high bytes before all low ones. Each byte is stored as its difference
+ * from its left neighbour, and all are deflated */
 
 /* Writes the two planes of bytes of a channel. `srgb`: its values are made linear. */
 static void split_bytes(const float *values, int32_t width, int32_t height, bool srgb, uint8_t *bytes) {
@@ -256,7 +256,7 @@ static void split_bytes(const float *values, int32_t width, int32_t height, bool
     }
 }
 
-/* An image, and what its file says of it. */
+/* An image, and the attributes of its file. */
 typedef struct source {
     const char *name;
     vsh_image image;
@@ -402,7 +402,8 @@ static void write_head(page *p) {
     write_embedded(p, &vshi_view_body);
 }
 
-/* A json_dump_callback_t. Escapes < > &, which only stand in strings, so that HTML takes them for text. */
+/* A json_dump_callback_t. Escapes < > &, which in JSON only occur within strings, so that HTML reads no
+ * tags. */
 static int write_escaped(const char *text, size_t size, void *user) {
     page *p = user;
     for (size_t i = 0; i < size; ++i) {

@@ -12,7 +12,8 @@
         return new Uint8Array(await new Response(stream).arrayBuffer());
     }
 
-    /* A plane of halves: all high bytes, then all low ones, each less its left neighbour (src/view/view.c). */
+    /* Reads a plane of halves: all high bytes, then all low ones. Each is stored as its difference from its left neighbour
+     * (src/view/view.c). */
     async function readPlane(id, width, height) {
         const texels = width * height, bytes = await inflate(VIEW.block(id));
         if (bytes.length !== 2 * texels) {

@@ -383,7 +383,7 @@ const VIEW = {};
         });
     }
 
-    /* The UV set of lightmaps: the given one, that of the lightmap, of AO if it has its own, or the one that `bake` chooses. */
+    /* The UV set of lightmaps: the one asked for, the lightmap's, AO's if it has its own, or the one that `bake` chooses. */
     function lightSet(material, arrays, asked) {
         const has = set => set < UV_SETS && arrays.uvs[set] !== null;
         if (asked >= 0) {
