@@ -56,16 +56,16 @@ enum {
 /* Error of the last library call, which the main thread made with &cli_error. */
 extern vsh_error cli_error;
 
-/* Print "vdbshade: …" as one line on standard error; control characters become '?'. The second prints the
- * kept warnings first, and returns `code`. */
+/* Print "vdbshade: …" as one line on standard error; control characters become '?'. cli_refuse() first prints
+ * the kept warnings, and returns `code`. */
 void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 int cli_refuse(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));
 #define cli_usage(...) cli_refuse(CLI_USAGE, __VA_ARGS__)
 #define cli_inform(...) (cli_given.quiet ? (void)0 : cli_say(__VA_ARGS__)) /* a result, unless --quiet */
 
-/* Return the exit code of a library call's result; errors come from cli_error. The second is for calls that
- * do not know the name of the file they judge: if the message names no existing file, it prints the command's
- * first operand before it. */
+/* Return the exit code of a library call, and print cli_error if it failed. cli_check_input() is for calls
+ * that do not know the file's name: if the message names no existing file, it prints the command's first
+ * operand before it. */
 int cli_check(vsh_result result);
 int cli_check_input(vsh_result result);
 
@@ -94,7 +94,7 @@ int cli_begin_writing(void);
 
 /* How the last command line wants library calls to run. Their warnings are kept for cli_print_warnings(). */
 extern vsh_run cli_run;
-void cli_complete_run(void); /* sets what follows from cli_given */
+void cli_complete_run(void); /* sets the members that depend on cli_given */
 
 /* Makes standard output a stream of text without control characters: names come from files, and terminals
  * obey such characters. */
@@ -147,7 +147,7 @@ const char *cli_end_path(const char *path, const char *end);
 int cli_check_apart(const char *const *outputs, size_t output_count, const char *const *inputs,
                     size_t input_count, const vsh_scene *scene);
 
-/* The same, and refuses outputs that cannot be written. */
+/* Checks like cli_check_apart(), and refuses outputs that cannot be written. */
 int cli_check_outputs(const char *const *outputs, size_t output_count, const char *const *inputs,
                       size_t input_count, const vsh_scene *scene);
 
@@ -197,12 +197,12 @@ void cli_write(FILE *out, const char *before, const char *text, const char *afte
 /* Parses the value of an option into the member `at` of the settings. `name` is "--sun". */
 typedef int cli_parse_fn(void *at, const char *name, const char *value);
 
-/* An option; without a name a heading of the help, or a group of settings. */
+/* An option. Without a name: a heading of the help, or a group of settings. */
 typedef struct cli_option {
     const char *name;
     const char *value;   /* placeholder; NULL: the option takes no value */
     const char *help;    /* line breaks count as blanks */
-    int kind;            /* one of the macros below */
+    int kind;            /* CLI_KIND_… */
     size_t place;        /* offset of the member that gets the value; of a setting, its number */
     void *global;        /* variable that gets the value instead; NULL: none */
     double least, most;  /* range of a number; the most items of a list */
@@ -214,7 +214,7 @@ enum {
     CLI_KIND_HEADING,
     CLI_KIND_HELP,
     CLI_KIND_SETTINGS, /* a group of the library's settings, VSH_SETTINGS_…, which give their own help */
-    CLI_KIND_SETTING,  /* one of them, by its name; of a scene rather than of a flat scene */
+    CLI_KIND_SETTING,  /* one of these settings, by its name; the scene's rather than the flat scene's */
     CLI_KIND_TEXT,     /* const char * */
     CLI_KIND_FLAG,     /* bool, which becomes true */
     CLI_KIND_POSITIVE, /* double, > 0 */
@@ -333,10 +333,10 @@ bool cli_read_integer(const char *text, int32_t *value, const char **rest);
      "memory that a step may take; with k, M, G or KiB, MiB, GiB; 0: no limit (3/4 of the machine's)",       \
      CLI_GLOBAL(BYTES, cli_run.memory_limit)},                                                               \
         {"sandbox", "auto|require|off",                                                                      \
-         "confine the process that parses files as far as this system can, and warn if that is not wholly; " \
-         "require: else read nothing; off: parse in this process, a little faster, where a damaged file "    \
-         "may "                                                                                              \
-         "crash it (auto)",                                                                                  \
+         "confine the process that parses files as far as this system can, and warn if it cannot fully; "    \
+         "require: read nothing if it cannot; off: parse in this process, a little faster, where a "         \
+         "damaged "                                                                                          \
+         "file may crash it (auto)",                                                                         \
          CLI_GLOBAL(WORD, cli_given.sandbox)},                                                               \
     {                                                                                                        \
         "allow-outside", NULL, "models may name files (buffers, materials) outside their folder",            \
@@ -424,7 +424,7 @@ typedef struct cli_stats {
 /* Returns empty statistics. */
 cli_stats cli_stats_begin(int of);
 
-/* Adds the time since the last call, or since the beginning or the casters, to a stage. */
+/* Adds the time since the last call of cli_stats_begin(), _lap() or _casters() to a stage. */
 void cli_stats_lap(cli_stats *stats, int stage);
 
 /* Stores the methods that the scene's settings choose, with triangles (not 0) or without. */

@@ -133,7 +133,7 @@ static char *draw_pictures(const vsh_channel_comparison *channel, const vsh_comp
 
 /* --- comparing */
 
-/* Draws a channel. Channels that are not measured, before it, have no pictures. */
+/* Draws a channel. Channels before it that were not measured get no picture. */
 static int32_t draw(void *user, size_t index, const vsh_channel_comparison *channel,
                     const vsh_compared *compared) {
     cli_comparison *c = user;

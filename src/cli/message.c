@@ -72,7 +72,7 @@ static struct {
     bool standing;    /* a line without its newline is on the terminal */
     char stage[NAME]; /* the last one reported */
     double began;     /* when it began, seconds */
-    double skipped;   /* its fraction then */
+    double skipped;   /* its fraction at that time */
     double last;      /* when something was written */
 } progress = {.lock = PTHREAD_MUTEX_INITIALIZER};
 
@@ -89,7 +89,7 @@ static void clear_line(void) {
     }
 }
 
-/* Writes a line, on a terminal one that is shorter than it is wide, with a bar if there is room. */
+/* Writes a line. On a terminal the line is cut to the width, and has a bar if there is room. */
 static void show_progress(double fraction, double now) {
     static const char full[] = "########################################";
     enum { WIDEST = sizeof full - 1, REST = 46 /* columns of the other text */ };
@@ -239,8 +239,8 @@ int cli_check_input(vsh_result result) {
 
 /* --- warnings
  *
- * Two warnings are of one kind if they differ only in files, quoted names and numbers. So neither the library
- * nor its reader processes number kinds. docs/warnings.md lists them. */
+ * Two warnings are of one kind if they differ only in files, quoted names and numbers. So neither the
+ * library nor its reader process has to number its warnings. docs/warnings.md lists them. */
 
 enum { KINDS = 64 }; /* warnings of further kinds are printed at once */
 
@@ -370,8 +370,8 @@ void cli_complete_run(void) {
 
 /* --- standard output */
 
-/* A cookie_write_function_t: writes all, or returns 0 with errno. A character of UTF-8 may continue one that
- * the text before began, so that text's last byte is checked again. */
+/* A cookie_write_function_t: writes all, or returns 0 with errno. A character of UTF-8 may have begun in the
+ * text before, so the last byte of that text is checked again. */
 static ssize_t write_plain(void *last, const char *text, size_t size) {
     char *before = last, *plain = malloc(size + 1);
     cli_end_progress(); /* both may be the same terminal */

@@ -1,7 +1,7 @@
 /* vdbshade regress: bakes the scenes of a folder, compares them with golden bakes, and reports.
  *
- * The folder may be a stranger's that a CI runs as it came. So only the command line of `regress` may ask for
- * written files, or for files parsed unconfined. */
+ * A CI may run a stranger's folder unread. So only the command line of `regress` may ask to write files,
+ * or to parse files unconfined. */
 #define _GNU_SOURCE /* memfd_create */
 #include "base/clock.h"
 #include "compare.h"
@@ -154,8 +154,8 @@ static int read_list(const char *path) {
     return code;
 }
 
-/* Options of all commands that change values, besides settings, which all do. Others are refused. Add a new
- * option here if it writes nothing. */
+/* Options that change values. All settings do, too; other options are refused. Add a new option here if it
+ * writes nothing. */
 static const char changes_values[] = " receive no-receive no-cast one-sided sun sun-angle lights "
                                      "light-radius caster treat half band box like inside "
                                      "name box-voxel-size density height size-world floor ";
@@ -221,8 +221,8 @@ static void mark_failed(regress_case *one, int code) {
     one->reason = cli_keep_text("%s", cli_last_line);
 }
 
-/* Whether a scene is one of `flat`. Parsed JSON takes a hundred times the bytes of its file, so files beyond
- * the memory limit count as scenes of `bake`, which refuses them. */
+/* Whether a scene is for `flat`. Parsed JSON takes a hundred times the bytes of its file, so files beyond the
+ * memory limit count as scenes of `bake`, which refuses them. */
 static bool has_region(const char *path) {
     const uint64_t most = cli_run.memory_limit > 0 ? cli_run.memory_limit / 100 : UINT64_MAX;
     FILE *file;

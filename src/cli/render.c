@@ -68,8 +68,8 @@ static const cli_option options[] = {
 
 /* --- the picture and its file */
 
-/* Floats of a pixel: colour, alpha, depth and normal. A file needs as many more: R, G, B and A of 8 bits, or
- * the planes of colour and normal for a file of floats. */
+/* FLOATS: of a pixel: colour, alpha, depth and normal. Writing needs more: ENCODED for R, G, B and A of 8
+ * bits, or SPLIT for the planes of colour and normal in a file of floats. */
 enum { FLOATS = 8, ENCODED = 4, SPLIT = 6 };
 
 static const char *const plane_names[FLOATS] = {"R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z"};
@@ -133,15 +133,15 @@ typedef struct render_shown {
     vsh_occluders *own; /* fields of the surfaces whose colours share a layer */
     render_lightmap *maps;
     size_t map_count;
-    vsh_lit_meshes *lit; /* [lit_count]: receivers with lightmaps, and behind them casters with triangles */
+    vsh_lit_meshes *lit; /* [lit_count]: receivers with lightmaps, then casters with triangles */
     size_t lit_count;
 } render_shown;
 
 /* --- casters
  *
- * Casters with triangles are shown as these, the others as a field for each colour. A layer's casters share
- * one field, which knows no casters. If they differ in colour, or some have triangles, each colour gets a
- * field of its own, for camera rays alone. */
+ * Casters with triangles are shown as triangles, the others as a field for each colour. A layer's casters
+ * share one field, which cannot tell them apart. If they differ in colour, or some have triangles, each
+ * colour gets a field of its own, for camera rays alone. */
 
 static const double default_color = 0.6; /* so that full light is not white */
 
@@ -174,7 +174,8 @@ static bool is_alike(const vsh_caster *a, const vsh_caster *b) {
            memcmp(one, other, sizeof one) == 0;
 }
 
-/* Whether all of a caster's layer are like it and without triangles, so that the layer's field shows them. */
+/* Whether all casters of its layer look like this one and lack triangles, so that the layer's field shows
+ * them. */
 static bool is_plain(const vsh_scene *scene, const vsh_assets *assets, const vsh_caster *caster) {
     bool plain = !cli_caster_is_direct(caster);
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -199,7 +200,8 @@ typedef struct split {
     size_t count;
 } split;
 
-/* Splits casters without triangles into groups; those that a field of the scene shows are done. */
+/* Sorts casters without triangles into groups. A group is shown by a field of the scene if that has no other
+ * casters, else as a layer of its own. */
 static void find_groups(const cli_shading *shading, split *p, render_shown *shown) {
     const vsh_scene *scene = shading->scene;
     for (size_t i = 0; i < scene->caster_count; ++i) {

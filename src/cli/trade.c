@@ -323,7 +323,7 @@ static const trade_plan plans[] = {
     {"exact", "#0072b2", "--max-error", {"0.05", "0.02", "0.01", "0.005"}},
 };
 
-/* Puts a plan over a scene of its own, and names the run by the options of `bake`. */
+/* Applies a plan to its own copy of the scene, and names the run by the options of `bake`. */
 static int apply_plan(const trade_subject *subject, const trade_plan *plan, const char *value,
                       vsh_scene *scene, trade_run *run) {
     const char *method = subject->ao ? "--ao-method" : "--method";
@@ -692,7 +692,7 @@ done:
     return code;
 }
 
-/* Casters must be one field. */
+/* Refuses casters that are not all in one field. */
 static int check_casters(const trade_settings *s, const vsh_scene *scene) {
     CLI_REFUSE_IF(scene->layer_count > 0, "%s: trade measures one field, not layers", s->bake.input);
     for (size_t i = 0; i < scene->caster_count; ++i) {
@@ -710,7 +710,7 @@ static int trade_main(int argc, char **argv) {
     CLI_TRY(cli_set_default("padding", "0"));
     CLI_REFUSE_IF(s.page == NULL || !cli_has_ending(s.page, "html"), "%s: give -o OUT.html",
                   s.page != NULL ? s.page : s.bake.input);
-    /* a mesh needs an output to become a scene; those of a scene are not written */
+    /* a mesh needs an output to become a scene, but no output is written */
     const bool scene = cli_has_ending(s.bake.input, "json") && s.bake.floor[0] == 0.0;
     s.bake.output = scene ? NULL : s.page;
     cli_bake_scene made;
@@ -718,7 +718,7 @@ static int trade_main(int argc, char **argv) {
     CLI_TRY_DONE(cli_bake_scene_make(&s.bake, &made));
     CLI_TRY_DONE(check_casters(&s, &made.scene));
     for (size_t i = 0; i < made.scene.receiver_count; ++i) {
-        made.receivers[i].allow_overlap = 1; /* texels are measured, whatever they show */
+        made.receivers[i].allow_overlap = 1; /* texels are measured, even if objects share them */
     }
     code = trade(&s, &made.scene);
 done:

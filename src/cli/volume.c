@@ -107,8 +107,8 @@ static int load(volume_work *work) {
     return CLI_OK;
 }
 
-/* Makes the voxels of the box, or of the band of all casters' level set, unless --like gave some. The level
- * set also has the size of a box's voxels, and without layers it casts. */
+/* Makes the voxels of the box, or of the band of all casters' level set, unless --like gave some. If no voxel
+ * size was given, the level set also gives the box its voxels' size. Without layers it casts, too. */
 static int make_voxels(volume_work *work) {
     const volume_settings *s = work->settings;
     cli_shading *shading = &work->shading;

@@ -134,7 +134,7 @@ const cli_command cli_bake = {
 
 /* --- checks before anything is read */
 
-/* Refuses a path that ends otherwise. NULL is none. */
+/* Refuses a path without the ending. NULL: the option was not given. */
 static int check_ending(const char *option, const char *path, const char *ending) {
     return path == NULL || cli_has_ending(path, ending)
                ? CLI_OK
@@ -222,10 +222,10 @@ typedef struct bake_run {
     const char *parts; /* the name before ".I-of-N.part" */
     size_t count;      /* lightmaps */
     int code;          /* exit code of check_loaded() */
-    bool files_known;  /* their warnings are not printed yet */
+    bool files_known;  /* the files are read, but their warnings are not printed yet */
 } bake_run;
 
-/* Checks the outputs again: objects' outputs have their names now, and models their textures. */
+/* Checks the outputs again: only now are the names of objects' outputs and of models' textures known. */
 static int check_lightmaps(const bake_run *b, const vsh_scene_lightmap *lightmaps, size_t count) {
     const cli_bake_settings *s = b->settings;
     const char *const others[] = {s->stats, s->exr, s->view, s->invalid_picture};
@@ -291,7 +291,7 @@ static int write_view(const cli_bake_settings *s, const vsh_receiver *receiver) 
         return CLI_OK;
     }
     if (cli_has_ending(receiver->output, "glb gltf")) {
-        bake.model = receiver->output; /* holds its light */
+        bake.model = receiver->output; /* contains its own light */
     } else {
         bake.model = receiver->path;
         bake.planes = (const char *const *)&receiver->output;
@@ -359,7 +359,7 @@ static int print_forecast(const bake_run *b, const vsh_bake_options *how, const 
 static int bake_scene(const cli_bake_settings *s, const vsh_scene *scene) {
     const char *output = s->output != NULL ? s->output : scene->receivers[0].output;
     bake_run b = {.settings = s, .scene = scene};
-    b.parts = s->merged != NULL ? s->merged : cli_end_path(output, ""); /* a folder of objects may be one */
+    b.parts = s->merged != NULL ? s->merged : cli_end_path(output, ""); /* may be a folder of objects */
     vsh_run run = cli_run;
     run.progress = report_progress;
     run.user = &b;

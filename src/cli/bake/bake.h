@@ -60,11 +60,11 @@ typedef struct cli_bake_settings {
     cli_list receive, no_receive, no_cast, casters;
     cli_densities densities;
     double sun[3];
-    double sun_angle_deg; /* cli_was_given() tells whether these two and the sun are given */
+    double sun_angle_deg; /* cli_was_given() tells whether the user gave these two and the sun */
     double light_radius;
     const char *lights; /* a file, or CLI_LIGHTS_OF_INPUT; NULL: none */
     double floor[5];    /* W, D, X, Y, Z; W 0: none */
-    double height;      /* a terrain's; 0: not given, as world[0] */
+    double height;      /* of a terrain; 0: not given, also in world[0] */
     double world[2];    /* world[1] 0: the image's shape decides */
     bool preview, per_object, dry_run;
     int32_t shard[2];         /* number and count of the part; 0: all of it */
@@ -91,12 +91,13 @@ typedef struct cli_bake_scene {
     vsh_light *lights; /* [scene.light_count]; NULL: all are the scene file's */
 } cli_bake_scene;
 
-/* These make a scene. Free it also after a failure. */
+/* Each of these makes a scene. Free it even after a failure. */
 
-/* With the casters and the settings that were given. */
+/* Makes only its casters and the given settings. */
 int cli_bake_scene_casters(const cli_bake_settings *settings, cli_bake_scene *made);
 
-/* All of it, with something to bake, and outputs that differ from each other and from the input. */
+/* Makes all of it. Checks that there is something to bake, and that outputs differ from each other and from
+ * the input. */
 int cli_bake_scene_make(const cli_bake_settings *settings, cli_bake_scene *made);
 void cli_bake_scene_free(cli_bake_scene *made);
 
@@ -125,7 +126,7 @@ typedef struct cli_shading {
     cli_stats stats;
 } cli_shading;
 
-/* Makes the scene for points; `of` is CLI_STATS_…. Free it also after a failure. */
+/* Makes the scene for points; `of` is CLI_STATS_…. Free it even after a failure. */
 int cli_shading_begin(cli_shading *shading, const cli_bake_settings *settings, int of);
 void cli_shading_free(cli_shading *shading);
 

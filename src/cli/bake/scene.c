@@ -146,7 +146,7 @@ static const char *place_output(const cli_bake_settings *s, const char *output) 
     return s->per_object && !vsh_lit_is_output(output) ? add_object_name(output) : output;
 }
 
-/* Names of objects are those of one file. */
+/* Options that name objects need one file of meshes. */
 static int check_objects(const cli_bake_settings *s, const cli_bake_scene *made, size_t receivers) {
     const bool one =
         receivers == 1 && (made->read == NULL || made->read->receivers[0].type == VSH_RECEIVER_MESH);
@@ -367,7 +367,7 @@ int cli_bake_scene_casters(const cli_bake_settings *s, cli_bake_scene *made) {
         CLI_TRY(check_input(s->input));
         made->scene = vsh_scene_default();
         if (cli_has_ending(s->input, "vdb")) {
-            made->scene.grid.resolution = 0; /* its own voxels */
+            made->scene.grid.resolution = 0; /* the file has its own voxels */
         }
     }
     add_casters(s, made);

@@ -146,8 +146,8 @@ void cli_points_close(cli_points_reader *reader) {
     *reader = (cli_points_reader){.job = NULL};
 }
 
-/* --- heads of the output. A row is the input's if the formats are the same, else position and normal; then
- * answers */
+/* --- heads of the output. If the formats are equal, a row starts as in the input, else with position and
+ * normal. Answers follow */
 
 static int fail(const cli_points_writer *w) {
     return cli_refuse(CLI_FILE, "%s: cannot be written: %s", w->name, strerror(errno));
@@ -162,7 +162,7 @@ static const char *column_name(const cli_points_writer *w, size_t i) {
 
 static void write_csv_head(const cli_points_writer *w, const cli_points_reader *reader) {
     if (w->keep && reader->table.header == NULL) {
-        return; /* a file without a header stays one */
+        return; /* without a header in the input, there is none in the output */
     }
     if (w->keep) {
         fwrite(reader->table.header, 1, reader->table.header_size, w->file);
@@ -272,7 +272,7 @@ static char *write_bits(const cli_points_writer *w, char *at, uint64_t bits, siz
     return at + size;
 }
 
-/* Text has all digits of a double also for positions in floats, so that readers get the same point. */
+/* Text has all digits of a double, even for positions in floats, so that readers get the same point. */
 static char *write_value(const cli_points_writer *w, char *at, double value, bool position) {
     const float single = (float)value;
     if (w->text) {
