@@ -14,11 +14,13 @@ using openvdb::Vec3d;
 constexpr int LEAF = 8;
 constexpr int REGION = Band::REGION;
 constexpr int LEAVES = REGION / LEAF;
-// A triangle less high over its longest edge, voxels, counts as that edge: floats cannot resolve its inside.
+// A triangle whose height over its longest edge is less, voxels, counts as that edge: floats cannot resolve
+// its inside.
 constexpr double FLAT = 2e-4;
-// In bands wider than this, voxels, most triangles within reach of a leaf are nowhere the nearest.
+// In bands wider than this, voxels, most triangles within reach of a leaf are the nearest of none of its
+// voxels.
 constexpr double WIDE = 6.0;
-// From a leaf's middle to its farthest voxels, rounded up; the same by axis.
+// Distance from a leaf's middle to its farthest voxels: in a straight line, rounded up, and along each axis.
 constexpr float LEAF_RADIUS = 6.07f;
 const Vec3d LEAF_HALF(3.5);
 // A triangle between two neighbouring voxels is at most √3 from either.
@@ -69,7 +71,7 @@ vshi_frame frame_of(const Corners &corner) {
     set_row(frame.row[VSHI_FRAME_HEIGHT], normal, -normal.dot(corner[longest]));
     for (int i = 0; i < 3; ++i) {
         const int e = (longest + i) % 3; // the longest first: the inside lies between its ends
-        if (flat && i > 0) {             // an edge far away, with everything on its outer side
+        if (flat && i > 0) {             // disable this edge: put it far away
             frame.row[VSHI_FRAME_BESIDE + i][3] = 1.0f;
             frame.low[i] = frame.high[i] = 1e6f;
             continue;
@@ -172,7 +174,7 @@ Band::Band(const Surface &surface_, double half_width_, Stage &stage)
         for (uint32_t half = 0; half < triangles_of(surface.polygons[i]); ++half) {
             const auto triangle = uint32_t(2 * i + half);
             visit_regions(corners_of(surface, triangle), half_width, [&](const Cell &cell) {
-                if (regions.empty() || !same(cell, last)) { // else the region of the triangle before
+                if (regions.empty() || !same(cell, last)) { // else the previous triangle has added the region
                     const auto found = numbers.emplace(cell, regions.size());
                     if (found.second) {
                         regions.emplace_back();

@@ -14,7 +14,7 @@ constexpr int LEAF = 8;
 constexpr double PIECE = 1.0;
 // Longest triangles whose box of cells is tested before they are cut, voxels.
 constexpr double GLANCE = 32.0;
-// Distance of a piece's middle from its triangle by rounding, voxels, with room.
+// Upper bound of the distance, voxels, by which rounding moves a piece's middle off its triangle.
 constexpr double MARGIN = 1e-5;
 using Piece = std::array<openvdb::Vec3s, 3>;
 
@@ -76,7 +76,7 @@ class Cutting {
             return is_near_outside(cell_of(middle)) ? Bounds::ALL : Bounds::NOTHING;
         }
         if (square[longest] >= GLANCE * GLANCE && stage.cancelled()) {
-            return Bounds::NOTHING; // the result is thrown away
+            return Bounds::NOTHING; // the caller discards the result
         }
         if (square[longest] < GLANCE * GLANCE) {
             const Bounds glanced = glance(corner);

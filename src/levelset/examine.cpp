@@ -1,6 +1,6 @@
-// Examines grids from outside. They call themselves level sets whether they hold distances or not (filtered,
-// scaled and advected ones do not). Distances change by a voxel's size from voxel to voxel at the surface,
-// and reach the background where the band ends.
+// Examines grids that others made. Some are called level sets but do not hold distances: filtered, scaled and
+// advected ones. Distances change by a voxel's size from voxel to voxel at the surface, and reach the
+// background where the band ends.
 #include "levelset/file.h"
 
 #include "base/elementary.h"
@@ -16,17 +16,18 @@ namespace vshi {
 
 namespace {
 
-// Matrices made of 32-bit floats stray from a rotation by 1e-6; a strayed scale bends distances by as much.
+// Largest deviation of a matrix from a rotation times a scale. Matrices made of 32-bit floats deviate by
+// 1e-6; distances are wrong by as much.
 constexpr double UNEVEN = 1e-4;
 constexpr double SMALLEST_READ = 1e-5;   // voxel size, world units; OpenVDB writes no smaller ones
 constexpr double NARROWEST = 3.0 - 1e-3; // half width, voxels; background is a float
 constexpr double LEAST_NORM = 0.8, GREATEST_NORM = 1.2; // norm of a distance's gradient on a lattice
 constexpr float PLATEAU = 1.0f - 1e-4f; // share of the background: a smaller inactive value is no background
-constexpr float BEYOND = 1.0f + 1e-3f;  // share of the background: a half-float's rounding is below
-constexpr float CLIFF = 1.5f;           // voxels from a voxel to the next, where a distance changes by 1
-constexpr float JUMP = 2.5f;            // the same where damaged: sheets thinner than a voxel make up to 1.9
-constexpr int STRIDES[3] = {64, 8, 1};  // of a leaf's values
-constexpr double CLIFF_SHARE = 0.1;     // of the band's rim; conversions of meshes leave some
+constexpr float BEYOND = 1.0f + 1e-3f;  // share of the background: rounding to half floats adds less
+constexpr float CLIFF = 1.5f; // voxels from a voxel to the next at the band's rim; a distance changes by 1
+constexpr float JUMP = 2.5f;  // a larger change is damage; sheets thinner than a voxel change by up to 1.9
+constexpr int STRIDES[3] = {64, 8, 1}; // of a leaf's values
+constexpr double CLIFF_SHARE = 0.1;    // of the steps at the band's rim; conversions of meshes leave some
 
 Finding finding(Finding::Kind kind, const char *format, ...) __attribute__((format(printf, 2, 3)));
 
@@ -95,10 +96,10 @@ namespace {
 // Counts of one leaf, or of all.
 struct Census {
     size_t negative = 0, positive = 0;
-    size_t flat = 0, steep = 0, norms = 0; // norms of gradients below, above, and all
-    size_t rim = 0, cliffs = 0;            // steps from the band to the background; those far too high
+    size_t flat = 0, steep = 0, norms = 0; // gradients: too small, too large, and all
+    size_t rim = 0, cliffs = 0;            // steps from the band to the background; those above CLIFF
     size_t plateaus = 0;                   // inactive values inside the band
-    size_t jumps = 0;                      // between neighbours that no distances can have
+    size_t jumps = 0;                      // between neighbours, too high for distances
     size_t outer = 0;                      // inactive values beyond the background
     openvdb::Index bad = Leaf::SIZE;       // first value that is not finite
 
@@ -178,7 +179,7 @@ size_t count_jumps_beside(const Leaf &leaf, const FloatTree &tree, float backgro
         at[axis] += ahead ? 8 : -1;
         const Leaf *beside = tree.probeConstLeaf(at);
         if (beside != nullptr && !ahead) {
-            continue; // it compares with this leaf itself
+            continue; // that leaf compares itself with this one
         }
         const float tile = beside == nullptr ? tree.getValue(at) : 0.0f;
         const openvdb::Index stride = STRIDES[axis], u = STRIDES[(axis + 1) % 3], v = STRIDES[(axis + 2) % 3];

@@ -17,7 +17,7 @@ struct GridName {
     std::string text() const { return std::string(path) + ": grid '" + grid + "'"; }
 };
 
-// A level set from outside, before its values are examined.
+// A level set of a file or a caller, before its values are examined.
 struct LevelSet {
     GridName name;
     FloatGrid::Ptr grid;
@@ -81,8 +81,8 @@ Finding examine_values(const FloatGrid &grid, double voxel, Stage &stage);
 // Fails for a finding that is BAD.
 void refuse_bad(const GridName &name, const Finding &finding);
 
-// Makes a handle of a level set from outside: examines its values, and computes its distances again if they
-// are ODD.
+// Makes a handle of a level set of a file or a caller: examines its values, and computes its distances again
+// if they are ODD.
 vsh_grid *close_level_set(LevelSet &set, Stage &stage);
 
 // --- parsing files (file.cpp)
@@ -118,11 +118,11 @@ size_t list_grids(const char *path, const vsh_run &run, std::vector<vsh_vdb_entr
 // Least voxel size that OpenVDB can write, world units: it copies the grids, and then smaller volumes are 0.
 constexpr double SMALLEST_WRITTEN = 1.45e-5;
 
-// A grid of ours: shares the tree.
+// Makes a grid that shares the tree.
 FloatGrid::Ptr named_grid(const FloatTree::Ptr &tree, const double *matrix, const std::string &name,
                           openvdb::GridClass grid_class);
 
-// The same for a handle's level set.
+// Makes a grid that shares the tree of a handle's level set.
 FloatGrid::Ptr named_surface(const vsh_grid &grid, const char *name);
 
 // Writes the grids that `make` returns as one file, atomically. Attributes become metadata, and replace any

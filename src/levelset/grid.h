@@ -1,5 +1,5 @@
-// Shared by all that is compiled against OpenVDB: failures, the handle of a level set, the lattice of a new
-// grid, and a stage of work.
+// Shared by all code that is compiled against OpenVDB: failures, the handle of a level set, the lattice of a
+// new grid, and a stage of work.
 #pragma once
 
 #include "base/guard.h"
@@ -16,7 +16,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
-// Compiled once, in grid.cpp: in each file that makes or reads a grid it would be most of its time.
+// Compiled once, in grid.cpp, because compiling it takes longer than the rest of any file that uses grids.
 extern template class openvdb::tree::Tree<openvdb::FloatTree::RootNodeType>;
 extern template class openvdb::Grid<openvdb::FloatTree>;
 
@@ -86,7 +86,8 @@ template <typename Use> void visit_blocks(const openvdb::CoordBBox &box, int32_t
 // Bytes of a grid per leaf: 512 values, two masks, origin, and its share of the nodes above.
 constexpr double BYTES_PER_LEAF = 2400.0;
 
-// Voxel sizes, world units: distances are 32-bit floats, and their squares and volumes must be such too.
+// Voxel sizes, world units: distances are 32-bit floats, and squares and volumes must be in the range of
+// these, too.
 constexpr double SMALLEST_VOXEL = 1e-12;
 constexpr double LARGEST_VOXEL = 1e12;
 
@@ -119,7 +120,7 @@ Lattice make_lattice(const vsh_grid_options *options, const Vec3d &low, const Ve
 // memory: OpenVDB ends the process when its thread pool runs out.
 void check_bytes(const vsh_run &run, double bytes, const char *what);
 
-// The same for a new grid; its message gives `leaves` as voxels of the band.
+// Checks the bytes of a new grid. The message gives `leaves` as voxels of the band.
 void check_memory(const vsh_run &run, double voxel, double leaves, double bytes);
 
 // A stage of work on the run's threads. Its progress is a fraction.
@@ -169,7 +170,7 @@ class Stage {
     std::atomic<size_t> reached{0};
 };
 
-// Makes a handle of a level set. Values at or beyond the background become ± background and inactive, all
+// Makes the handle of a level set. Values at or beyond the background become ± background and inactive, all
 // others active. `shell` is the thickness of open meshes in it, world units.
 vsh_grid *close_grid(const FloatGrid::Ptr &level_set, const Matrix &matrix, double shell, Stage &stage);
 

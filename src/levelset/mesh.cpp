@@ -35,7 +35,7 @@ struct Meshes {
     Vec3d low{DBL_MAX};
     Vec3d high{-DBL_MAX};
     size_t triangles = 0;
-    // If masks cut some meshes, all meshes: for those their opaque pieces
+    // All meshes if some have masks; these are replaced by their opaque pieces
     std::vector<vsh_mesh> cut;
     std::vector<vshi_mask_pieces> pieces;
 
@@ -162,7 +162,7 @@ struct Solid {
 
 // Faces with a thin wall behind them. Walls that stand apart are voxelised together.
 struct Wall {
-    bool inward = true; // the faces look inwards, and the wall is outside of them; else within
+    bool inward = true; // the faces look inwards, and the wall lies outside of them; else inside
     bool open = false;  // the faces have holes
     Surface faces;
     Surface closed;                    // with their holes closed

@@ -1,5 +1,5 @@
 // Reading .vdb files, in this process or by run.reader: level sets, lists of grids, dense copies. The first
-// part is the messages of the reader, whose content the caller checks.
+// part encodes and decodes the messages of the reader; decoding checks their content.
 #include "levelset/file.h"
 
 #include <cmath>
@@ -53,7 +53,7 @@ bool is_aligned(const int32_t origin[3], int32_t width) {
                        [&](int32_t o) { return o % width == 0 && o >= -LAST_INDEX && o <= LAST_INDEX; });
 }
 
-// Adds the first tile of each node that has no children: it makes the node again.
+// Adds the first tile of each node that has no children: the receiver makes the node from that tile.
 template <typename Node>
 void add_childless(const FloatTree &tree, int32_t level, std::vector<TileData> &tiles) {
     std::vector<const Node *> nodes;

@@ -141,9 +141,9 @@ FloatGrid::Ptr measure_surface(const Surface &surface, const Lattice &lattice, d
 
 namespace {
 
-// Points nearer to the zero than this, voxels, stay: flat parts, and curved ones of radii of 30 voxels and
-// more, cost one evaluation a point. An edge that lies so near to a cell's face may be cut by half a voxel
-// with 0.02.
+// Points nearer to the zero than this, voxels, stay. So flat parts, and curved ones of radii from 30 voxels
+// on, cost one evaluation a point. With 0.02, an edge that lies so near to a cell's face could lose half a
+// voxel.
 constexpr double NEAR_ENOUGH = 0.002;
 // Step of the gradient's differences, voxels: small, so that edges are hardly ever within it.
 constexpr double STEP = 1.0 / 1024;
@@ -151,7 +151,7 @@ constexpr double STEP = 1.0 / 1024;
 // of planes at right angles, and stays along directions that no plane restricts.
 constexpr double HOLD = 0.01;
 constexpr int ROUNDS = 4;
-// A point may lie on its cell's faces, and a rounding beyond.
+// A point may lie on its cell's faces, and by rounding a little beyond.
 constexpr double MARGIN = 1e-3;
 
 struct Planes {
@@ -170,8 +170,8 @@ Vec3d gradient(const IndexDistance &distance, const Vec3d &p) {
     return g;
 }
 
-// Finds the field's zero between a place inside and one outside: by bisection, as false position creeps where
-// a second side of an edge is near, and at last by linear interpolation.
+// Finds the field's zero between a place inside and one outside: first by bisection, because false position
+// converges slowly where a second side of an edge is near, and at last by linear interpolation.
 Vec3d zero_between(const IndexDistance &distance, Vec3d inside, Vec3d outside) {
     for (int i = 0; i < 10; ++i) {
         const Vec3d middle = 0.5 * (inside + outside);

@@ -12,9 +12,10 @@ namespace vshi {
 
 namespace {
 
-// Relative difference of voxel sizes that moves no voxel by a whole one, at any index.
+// Sizes of voxels that differ by less than this share are equal: at any index, the difference moves a voxel
+// by less than its size.
 constexpr double SAME_SIZE = 1e-9;
-constexpr double SAME_PLACE = 1e-3; // voxels by which a lattice may be off
+constexpr double SAME_PLACE = 1e-3; // voxels by which an instance may be off the lattice
 constexpr double UNEVEN = 1e-6;     // of an instance's axes, relative
 
 struct Placed {
