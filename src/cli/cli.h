@@ -457,7 +457,7 @@ typedef struct cli_provenance {
 
 /* Makes the provenance of the parsed command, a scene (NULL: none) and `files`, the first operand first. NULL
  * files, and those that the scene names, add nothing. `casters` has the voxels and triangles, or is NULL.
- * Free it also after a failure. */
+ * Free it even after a failure. */
 int cli_provenance_make(const vsh_scene *scene, const char *const *files, size_t file_count,
                         const vsh_occluders_info *casters, cli_provenance *origin);
 void cli_provenance_free(cli_provenance *origin);

@@ -65,7 +65,7 @@ typedef struct cli_comparison {
     bool alike;
 } cli_comparison;
 
-/* Compares two files; CLI_OK whether they are alike or not. Free the comparison also after a failure. */
+/* Compares two files; CLI_OK whether they are alike or not. Free the comparison even after a failure. */
 int cli_comparison_make(const cli_compare_settings *settings, const char *golden, const char *fresh,
                         cli_comparison *comparison);
 void cli_comparison_free(cli_comparison *comparison);

@@ -22,7 +22,7 @@ typedef struct vshi_source {
 } vshi_source;
 
 /* Opens a regular file of at most `most` bytes, or (NULL) standard input. Errors: as vshi_input_open().
- * Close it also after an error. */
+ * Close it even after an error. */
 vsh_result vshi_source_open(const char *path, uint64_t most, vshi_source *source, vsh_error *error);
 void vshi_source_close(vshi_source *source);
 
@@ -136,7 +136,7 @@ typedef struct vshi_table_row {
 } vshi_table_row;
 
 /* Opens a file, or (NULL) standard input, and reads its header. The units of `job` are bytes; it outlives the
- * table, and may be NULL. Close the table also after an error. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY,
+ * table, and may be NULL. Close the table even after an error. Errors: VSH_ERROR_READ, VSH_ERROR_MEMORY,
  * VSH_ERROR_CANCELLED, VSH_ERROR_INPUT (a bad header, missing columns). */
 VSHI_SHARED vsh_result vshi_table_open(const char *path, int32_t format, const vshi_table_columns *wanted,
                                        vshi_job *job, vshi_table *table, vsh_error *error);

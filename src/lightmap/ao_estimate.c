@@ -107,7 +107,7 @@ static bool is_own(const estimating *s, size_t at) {
     return at > 0 && s->shots->rays[at - 1] > 0 && s->shots->level[at - 1] == s->spacing;
 }
 
-/* Lists the texels of a block. False if none is to be estimated. */
+/* Lists the texels of a block. False if no texel needs an estimate. */
 static bool find_texels(const estimating *s, block *b) {
     bool any = false;
     for (int32_t k = 0; k < TEXELS; ++k) {
@@ -127,7 +127,7 @@ static void lay_out(const estimating *s, block *b) {
     float spread = 0.0f;
     for (size_t k = 0; k < TEXELS; ++k) {
         const size_t i = b->at[k] - 1;
-        if (b->at[k] == 0 || s->shots->rays[i] == 0 || /* or it stands in a damaged part */
+        if (b->at[k] == 0 || s->shots->rays[i] == 0 || /* 0 rays: a part of the bake is damaged */
             !(s->shots->own.ao[i] >= 0.0f && s->shots->own.ao[i] <= 1.0f)) {
             b->at[k] = 0;
             continue;
@@ -181,7 +181,7 @@ static void estimate(const estimating *s, const block *b, const uint16_t *places
     const double max_error = s->shade->max_error;
     vshi_windows_estimate(&b->windows, places, count, max_error, 0, estimates);
     for (size_t k = 0; k < count; ++k) {
-        if (!(estimates[k].centred <= VSHI_AO_TILE_ENOUGH * max_error)) { /* few */
+        if (!(estimates[k].centred <= VSHI_AO_TILE_ENOUGH * max_error)) { /* too few rays */
             vshi_window_estimate own;
             vshi_windows_estimate(&b->windows, &places[k], 1, max_error, VSHI_CELL, &own);
             estimates[k] = own.centred < estimates[k].centred ? own : estimates[k];
@@ -238,7 +238,7 @@ static vsh_result estimate_block(void *user, size_t number, vsh_error *error) {
     return VSH_OK;
 }
 
-/* --- of those between */
+/* --- estimates of the texels between these */
 
 /* A cell whose texels are estimated by the windows of its corners. */
 typedef struct cell {
@@ -291,7 +291,7 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
                                                                    (double)s->map.normal[3 * corner + axis]);
         }
     }
-    if (!(sum > 0.0)) { /* a damaged part of a bake */
+    if (!(sum > 0.0)) { /* the part of the bake is damaged */
         s->values[i] = 0.0f;
         return;
     }
@@ -304,7 +304,7 @@ static void fill_texel(const estimating *s, const cell *c, int32_t dx, int32_t d
     }
 }
 
-/* Fills the texels between of a row of cells. A vshi_element_fn. */
+/* Fills the other texels of a row of cells. A vshi_element_fn. */
 static vsh_result fill_row(void *user, size_t number, vsh_error *error) {
     const estimating *s = user;
     const int32_t row = (int32_t)number * s->spacing, bottom = row + s->spacing;
@@ -329,7 +329,7 @@ static vsh_result fill_row(void *user, size_t number, vsh_error *error) {
     return VSH_OK;
 }
 
-/* --- all */
+/* --- the estimate of a page */
 
 /* Sums a row of cells for the statistics. A vshi_element_fn. */
 static vsh_result sum_row(void *user, size_t row, vsh_error *error) {

@@ -484,7 +484,7 @@ static void trace_light(const tracing *t, work *w, size_t tile, size_t index) {
           *tint = plane_of(planes->tint, index);
     const vsh_light *light = &tracer->lights[index];
     const size_t lit = count_lit(w, &tracer->shadow[index].world);
-    if (lit == 0) { /* the planes are 0 already */
+    if (lit == 0) { /* the planes are already 0 */
         t->page->stats[tile].skipped += w->origins.count;
         return;
     }
@@ -542,7 +542,7 @@ static void trace_ao(const tracing *t, work *w, size_t tile, bool sky) {
     const channel c = begin_channel(t, tile, tracer->light_count + sky);
     const vshi_ao_values values = {w->values, w->deviation, bent ? w->vectors : NULL};
     vshi_ao_points(sky ? &tracer->sky : &tracer->ao, &points, faces_of(t, w), &values, c.stats);
-    if (sky) { /* the error of rays is that before the weighing, which makes it less */
+    if (sky) { /* w->deviation keeps the error before this weighing, which makes it smaller */
         double up[3];
         vshi_sky_up(planes->asked.sky, up);
         for (size_t k = 0; k < w->origins.count; ++k) {
@@ -635,7 +635,7 @@ static vsh_result shoot_ao(const tracing *t, work *w, size_t tile, bool sky, vsh
 /* Notes which texels are valid so far, and their meshes. */
 static void note_texels(const tracing *t, const work *w) {
     vshi_page *page = t->page;
-    for (size_t i = w->own; i > 0; --i) { /* a texel is its first sample's */
+    for (size_t i = w->own; i > 0; --i) { /* backwards, so that the first sample of a texel decides */
         const size_t place = vshi_page_place(page, w->samples.texel[i - 1]);
         page->mesh[place] = vshi_sample_mesh(&w->samples, i - 1) + 1;
         page->state[place] = VSHI_TEXEL_INVALID;

@@ -19,7 +19,7 @@ enum { ONE_IN = 16, ONE_TRACED_IN = 64, MOST = 16384, MOST_TRACED = 4096, LEAST 
  * error asked for. */
 enum { RAYS = 64, FINE_RAYS = 256 };
 static const double FINE = 0.01;
-/* Sums are multiples of this, so that their order does not show. */
+/* Sums are multiples of this, so that their order does not change them. */
 static const double UNIT = 0x1p-32;
 
 static vshi_truth truth_of(const vsh_occluders *occluders, const vsh_shade_options *shade) {

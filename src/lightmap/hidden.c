@@ -1,7 +1,7 @@
-/* Charts that are hidden as a whole, as the bottom of a box on another. None of their texels has a value, and
- * no one sees them. But lines of their borders show through where surfaces meet, and coarse mip levels
- * contain them. So each texel takes the value of the texel that is nearest in the world, among the edges of
- * visible surfaces. */
+/* Charts that are hidden as a whole, like the bottom of a box that stands on another. None of their texels
+ * has a value, and no one sees them. But lines of their borders show through where surfaces meet, and coarse
+ * mip levels contain them. So each texel takes the value of the texel that is nearest in the world, among the
+ * edges of visible surfaces. */
 #include "base/floats.h"
 #include "base/memory.h"
 #include "base/parallel.h"
@@ -27,7 +27,7 @@ enum { MOST_PADDING = 4 };
 
 static const uint32_t NONE = UINT32_MAX;
 
-/* More states: filled here; an empty one already tested. */
+/* More states: a texel that is filled here; an empty texel that was tested. */
 enum { HIDDEN = VSHI_TEXEL_KINDS, TESTED };
 
 typedef struct hiding {
@@ -96,7 +96,7 @@ static bool is_far(const hiding *h, uint32_t a, uint32_t b) {
     return x * x + y * y > OWN_SQUARE;
 }
 
-/* Lists texels that are not valid, without those filled from near. */
+/* Lists texels that are not valid, except those filled from near texels. */
 static vsh_result find_hidden(hiding *h, vsh_error *error) {
     const size_t count = h->width * h->height;
     vshi_spread spread;

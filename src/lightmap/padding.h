@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* The kind of a texel, kept apart from its value, as darkness is no hole. */
+/* The kind of a texel. Its value cannot tell: a dark texel is no hole. */
 enum {
     VSHI_TEXEL_EMPTY = 0,   /* no chart */
     VSHI_TEXEL_VALID = 1,   /* has a value; others copy only from these */
@@ -53,7 +53,7 @@ vsh_result vshi_spread_find(vshi_store *store, size_t width, size_t height, cons
                             const uint8_t *state, vshi_spread *spread, vsh_error *error);
 void vshi_spread_free(vshi_store *store, vshi_spread *spread);
 
-/* Copies the values of valid sources, and notes it in the state. */
+/* Copies the values of valid sources, and sets the state of these texels to VSHI_TEXEL_FILLED. */
 void vshi_spread_copy(const vshi_spread *spread, uint8_t *state, const vshi_plane *planes,
                       size_t plane_count);
 

@@ -128,7 +128,7 @@ void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more) {
     sum->worst = fmax(sum->worst, more->worst);
 }
 
-/* In the order of the tiles, so that the order of work does not show. */
+/* Adds in the order of the tiles, so that the order of work does not change the sums. */
 static void add_tiles(const vshi_page *page, vsh_bake_stats *stats) {
     for (size_t tile = 0; tile < vshi_charts_tiles(&page->charts->sorted); ++tile) {
         vshi_shade_stats_add(&stats->shade, &page->stats[tile]);

@@ -50,7 +50,7 @@ typedef struct vshi_origins {
                          highest probe */
 } vshi_origins;
 
-/* Allocates origins. Free them also after an error. Errors: VSH_ERROR_MEMORY. */
+/* Allocates origins. Free them even after an error. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_origins_allocate(vshi_origins *origins, size_t room, vsh_error *error);
 void vshi_origins_free(vshi_origins *origins);
 
@@ -63,7 +63,7 @@ enum { VSHI_ORIGIN_BYTES = 6 * sizeof(double) + 6 * sizeof(float) + 2 * sizeof(u
  * inside, invalid. Layers count too. */
 void vshi_origins_find(const vshi_placement *placement, const vshi_samples *samples, vshi_origins *origins);
 
-/* Adds samples `first` and on as the frame. */
+/* Adds the samples from `first` on as the frame. */
 void vshi_origins_add_frame(const vshi_placement *placement, const vshi_samples *samples, size_t first,
                             vshi_origins *origins);
 
@@ -126,7 +126,7 @@ typedef struct vshi_page {
     size_t error_count;
 } vshi_page;
 
-/* Allocates a page with these planes, zeroed. `shared`: texels share rays of AO. Close it also after an
+/* Allocates a page with these planes, zeroed. `shared`: texels share rays of AO. Close it even after an
  * error, before the store, which holds its arrays. Errors: as vshi_store_take(). */
 vsh_result vshi_page_open(const vsh_charts *charts, const vsh_lightmap *lightmap, size_t light_count,
                           const vsh_shade_options *shade, bool shared, vshi_store *store, vshi_page *page,
@@ -184,7 +184,7 @@ void vshi_bake_error_add(vsh_bake_error *sum, const vsh_bake_error *more);
 /* Shared by all tiles of a bake. */
 typedef struct vshi_tracer vshi_tracer;
 
-/* Prepares the shading of pages with these planes, of which only NULL or not counts, and their options. The
+/* Prepares the shading of pages with these planes and their options. Only whether a plane is NULL counts. The
  * other arguments must outlive it. Errors: as vsh_bake_lightmap(). */
 vsh_result vshi_tracer_create(const vsh_occluders *occluders, const vsh_light *lights, size_t light_count,
                               const vsh_shade_options *shade, const vsh_lightmap *planes, bool compared,
@@ -238,9 +238,9 @@ typedef struct vshi_vertex_colors {
     double *error;    /* [meshes]: RMSE of the interpolated colours at the mesh's points; 0 without points */
 } vshi_vertex_colors;
 
-/* Fits the colours of all vertices to the points that `coverage` has as valid, for the least squared error
- * of the interpolated triangles. Vertices with equal positions and normals share a colour. `values` are
- * [texels][channels] (1 or 3), cut to 0 … 1, as colours are. Free both arrays also after an error. Errors:
+/* Fits the colours of all vertices to the points that are valid by `coverage`, for the least squared error of
+ * the interpolated triangles. Vertices with equal positions and normals share a colour. `values` are
+ * [texels][channels] (1 or 3), cut to 0 … 1, as colours are. Free both arrays even after an error. Errors:
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_vertex_colors_fit(const vsh_charts *charts, const float *coverage, const float *values,
                                   size_t channels, const vsh_run *run, vshi_vertex_colors *colors,
@@ -266,11 +266,11 @@ typedef struct vshi_field_error {
     vshi_truth_channel *channels; /* [light_count + 2]: lights, AO, the sky; NULL: nothing is compared */
 } vshi_field_error;
 
-/* Prepares it for a lightmap with `samples` samples, without channels. */
+/* Prepares the comparison for a lightmap with `samples` samples. It has no channels yet. */
 vshi_field_error vshi_field_error_open(const vsh_occluders *occluders, const vsh_shade_options *shade,
                                        uint64_t samples, bool traced);
 
-/* Close the channel also after an error. Errors: VSH_ERROR_MEMORY. */
+/* Close the channel even after an error. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_truth_channel_open(const vshi_field_error *of, const vsh_light *light,
                                    const vsh_shade_options *options, vshi_truth_channel *channel,
                                    vsh_error *error);
@@ -287,7 +287,7 @@ typedef struct vshi_compared_sample {
 size_t vshi_field_error_choose(const vshi_field_error *of, const vshi_samples *samples,
                                const vshi_origins *origins, vshi_compared_sample *compared);
 
-/* Adds the errors of a channel's values [origins], but for origins at `places` [origins][3] that the light
+/* Adds the errors of a channel's values [origins]. Leaves out origins whose `places` [origins][3] the light
  * does not reach. */
 void vshi_field_error_add(const vshi_truth_channel *channel, const vshi_samples *samples,
                           const double *places, const vshi_compared_sample *compared, size_t count,

@@ -79,7 +79,7 @@ vsh_result vshi_places_sort(vshi_places *places, vsh_error *error) {
         const int axis = longest_axis(places->list, p.begin, p.end);
         select_middle(places->list, p.begin, p.end, middle, axis);
         places->axis[middle] = (uint8_t)axis;
-        open[count++] = (part){p.begin, middle}; /* halves: no more are open than it is deep */
+        open[count++] = (part){p.begin, middle}; /* parts are halves, so at most DEEPEST are open */
         open[count++] = (part){middle + 1, p.end};
     }
     return VSH_OK;
@@ -107,7 +107,7 @@ static void consider(const vshi_place *place, const float at[3], nearest *best) 
     }
 }
 
-/* A part whose places are at least so far. */
+/* A part of the tree, and a lower bound of the distance to its places. */
 typedef struct far_part {
     part part;
     float square;

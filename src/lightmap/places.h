@@ -23,7 +23,7 @@ typedef struct vshi_places {
 enum { VSHI_PLACE_BYTES = sizeof(vshi_place) + 1 };
 
 /* Sorts places->list [count], and makes the tree. Errors: VSH_ERROR_MEMORY. Free with vshi_places_free(),
- * also after an error. */
+ * even after an error. */
 vsh_result vshi_places_sort(vshi_places *places, vsh_error *error);
 void vshi_places_free(vshi_places *places);
 

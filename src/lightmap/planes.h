@@ -6,14 +6,14 @@
 #include <stdbool.h>
 #include <vdbshade/lightmap.h>
 
-/* How many of them are shaded by themselves, as AO is. Cannot fail. */
+/* Counts the planes that are shaded by themselves, as AO is. Cannot fail. */
 int32_t vshi_planes_shaded(const vsh_planes *planes);
 
 /* The needs of planes. */
 enum {
     VSHI_NEEDS_LIGHTS = 1, /* the visibility of lights; planes of lights are filled as they are shaded */
     VSHI_NEEDS_AO = 2,     /* AO; planes of AO are filled like those of lights */
-    VSHI_NEEDS_OPEN = 4    /* its own shading, by the rays of AO */
+    VSHI_NEEDS_OPEN = 4    /* shading of its own, by the method of AO */
 };
 
 enum { VSHI_NO_WISH = -1 };
@@ -69,7 +69,7 @@ static inline bool vshi_plane_given(const vsh_lightmap *lightmap, const vshi_pla
  */
 void vshi_plane_set(vsh_lightmap *lightmap, const vshi_plane_kind *kind, float *const *planes);
 
-/* The needs, VSHI_NEEDS_…, of all planes. Only NULL or not counts: all lights have planes or none. */
+/* The needs, VSHI_NEEDS_…, of all planes that are not NULL. Either all lights have planes or none. */
 uint32_t vshi_planes_need(const vsh_lightmap *lightmap);
 
 /* --- rows */
@@ -109,7 +109,7 @@ vsh_shade_options vshi_sky_options(const vsh_shade_options *options, int32_t axi
 /* Weighs the free share above the horizon by the part of the hemisphere above it. */
 float vshi_sky_weighed(const float normal[3], const double up[3], float open);
 
-/* Whether a scene has the wish for a plane. */
+/* Whether a scene asks for a plane. */
 static inline bool vshi_plane_wished(const vshi_plane_kind *kind, const vsh_planes *planes) {
     return kind->wish != VSHI_NO_WISH && *(const int32_t *)((const char *)planes + kind->wish) != 0;
 }

@@ -268,7 +268,7 @@ static vsh_result make_rows(making *m, vsh_error *error) {
                 ++system->crowded;
                 continue;
             }
-            /* ends are those of the next edge too */
+            /* the next edge has these ends, too */
             row->share = places > 1 && (p == 0 || p + 1 == places) ? 0.5f * share : share;
             system->shares += (double)row->share;
             for (int k = 1; k < READS; ++k) {
@@ -282,7 +282,7 @@ static vsh_result make_rows(making *m, vsh_error *error) {
 
 /* --- islands */
 
-/* Turns counts into the begins of groups: counts[g + 1] is the count of group g. */
+/* Turns counts into the first places of groups: counts[g + 1] is the count of group g. */
 static void add_up(uint32_t *counts, size_t groups) {
     for (size_t g = 0; g < groups; ++g) {
         counts[g + 1] += counts[g];
@@ -645,7 +645,7 @@ static void stitch_islands(void *user, size_t begin, size_t end) {
     }
 }
 
-/* In the order of the islands. Light counts relative to the largest value. */
+/* Adds in the order of the islands. Light counts relative to the largest value. */
 static void add_sums(stitching *s, const channel *c) {
     double before = 0.0, after = 0.0, largest = 0.0;
     for (size_t i = 0; i < s->system.island_count; ++i) {
@@ -667,7 +667,7 @@ static vsh_result stitch_channels(stitching *s, const vsh_run *run, vsh_error *e
     const double bytes = (double)room * ((double)system->unknown_count * VECTORS * sizeof(double) +
                                          (double)system->island_count * sizeof(island));
     VSHI_TRY(vshi_check_limit(run, system->bytes + bytes, "seams", error));
-    /* one more of each, as there may be none */
+    /* one more of each, because there may be none */
     VSHI_TRY(vshi_allocate((void **)&s->vectors, room * VECTORS, (system->unknown_count + 1) * sizeof(double),
                            "seams", error));
     VSHI_TRY(vshi_allocate((void **)&s->islands, room * (system->island_count + 1), sizeof(island), "seams",

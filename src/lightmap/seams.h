@@ -29,7 +29,7 @@ typedef struct vshi_seams {
  * seam is an edge between two charts, or within one, with equal ends in the world. At both ends the sides'
  * normals differ by at most an angle with this cosine. Of edges with many triangles only some pairs count.
  * Errors: VSH_ERROR_LIMIT (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED.
- * Free with vshi_seams_free(), also after an error. */
+ * Free with vshi_seams_free(), even after an error. */
 vsh_result vshi_seams_find(const vshi_seam_pages *pages, double cosine, const vsh_run *run, vshi_job *job,
                            vshi_seams *seams, vsh_error *error);
 void vshi_seams_free(vshi_seams *seams);

@@ -157,7 +157,7 @@ static vsh_result compare_pair(seam_search *search, const uint32_t edge[2], cons
 static const double ON_EDGE = 5e-7;
 
 enum {
-    MOST_CUTS = 1024,    /* of an edge; more cuts come from no edge of a wall */
+    MOST_CUTS = 1024,    /* of an edge; no edge of a wall has more */
     MOST_LOOKED = 65536, /* ends near an edge that are tested */
     POLL_PARTS = 256
 };

@@ -102,7 +102,7 @@ struct vsh_charts {
 void vshi_warn_mesh_uvs(const char *file, const vsh_mesh *mesh, size_t index, const vsh_uv_report *uv,
                         const vsh_run *run);
 
-/* Every second bit of a number of six bits: texels of a cell along Morton's curve (1966). */
+/* Returns every second bit of a number of six bits: texels of a cell along Morton's curve (1966). */
 static inline size_t vshi_even_bits(size_t number) {
     return (number & 1) | (number >> 1 & 2) | (number >> 2 & 4);
 }
@@ -153,7 +153,7 @@ typedef struct vshi_overlaps {
 /* The most bytes of tiles at work on `threads` threads (0: all cores). */
 double vshi_tile_bytes(const vshi_charts *charts, int32_t threads);
 
-/* Errors: VSH_ERROR_MEMORY. Close the tile also after an error. */
+/* Errors: VSH_ERROR_MEMORY. Close the tile even after an error. */
 vsh_result vshi_tile_open(const vshi_charts *charts, size_t number, vshi_tile *tile, vsh_error *error);
 void vshi_tile_close(vshi_tile *tile);
 
@@ -191,7 +191,7 @@ static inline size_t vshi_sample_bytes(bool tangents) {
     return 3 * sizeof(double) + (tangents ? 13 : 9) * sizeof(float) + 2 * sizeof(uint32_t);
 }
 
-/* Allocates samples. Free them also after an error. Errors: VSH_ERROR_MEMORY. */
+/* Allocates samples. Free them even after an error. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_samples_allocate(vshi_samples *samples, size_t room, bool tangents, vsh_error *error);
 void vshi_samples_free(vshi_samples *samples);
 
@@ -221,16 +221,16 @@ typedef void vshi_samples_fn(void *user, const vshi_samples *samples);
 vsh_result vshi_tile_visit(const vsh_charts *charts, size_t number, bool tangents, vshi_samples_fn *visit,
                            void *user, vsh_error *error);
 
-/* Charts that lie closer to each other than a texel: what is read between texels takes from both. */
+/* Charts that lie closer to each other than a texel, so that bilinear lookups mix both. */
 typedef struct vshi_closeness {
-    uint64_t texels;      /* that borders so close to another chart's pass */
-    uint64_t mesh_texels; /* those of the mesh with the most, */
-    size_t mesh;          /* which is this */
+    uint64_t texels;      /* passed by borders that are so close to another chart */
+    uint64_t mesh_texels; /* such texels of the worst mesh */
+    size_t mesh;          /* the worst mesh */
     double gap;           /* the least between two charts, texels; 1: none is less */
 } vshi_closeness;
 
-/* Measures a receiver's charts at a size; a chart is what hangs together by edges in space and in the UVs.
- * Errors: VSH_ERROR_ARGUMENT (sizes, run), VSH_ERROR_INPUT (no UVs, and as vsh_mesh_check()), VSH_ERROR_LIMIT
- * (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY. */
+/* Measures a receiver's charts at a size. A chart is a set of triangles connected by edges in space and in
+ * the UVs. Errors: VSH_ERROR_ARGUMENT (sizes, run), VSH_ERROR_INPUT (no UVs, and as vsh_mesh_check()),
+ * VSH_ERROR_LIMIT (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY. */
 vsh_result vshi_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
                                  const vsh_run *run, vshi_closeness *found, vsh_error *error);

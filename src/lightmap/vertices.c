@@ -1,5 +1,5 @@
 /* Vertex colours by least squares over points on the faces (Kavan, Bargteil and Sloan, "Least squares vertex
- * baking", 2011). The value at the vertex itself is often hidden inside a neighbour, and lies off the mean of
+ * baking", 2011). A vertex itself is often hidden inside a neighbour, and its own value is not the mean of
  * the triangles around it. */
 #include "base/memory.h"
 #include "geometry/edges.h"

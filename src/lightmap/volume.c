@@ -146,8 +146,8 @@ static uint64_t count_bits(const uint64_t mask[VSHI_MASK_WORDS]) {
 /* A field's slope is 1, except between two equally near surfaces. There it has no direction. */
 static const double FLAT = 0.1;
 
-/* The sure share of a distance, beyond a finest voxel. A sample is good to 0.87 voxels of its level, which is
- * used from 2.75 of them on. */
+/* A true distance is at least this share of a sampled one, minus a finest voxel. A sample errs by up to 0.87
+ * voxels of its level, and a level is used from 2.75 of its voxels on. */
 static const double SURE = 0.65;
 
 /* Voxels of a block on their way through the shading. */
@@ -659,7 +659,7 @@ static void describe(const volume_bake *bake, const vsh_light *lights, vshi_chan
     }
 }
 
-/* Begins the volume, and allocates the masks. Errors: as vshi_volume_begin(). Free both also after an
+/* Begins the volume, and allocates the masks. Errors: as vshi_volume_begin(). Free both even after an
  * error. */
 static vsh_result begin(volume_bake *bake, const vsh_light *lights, const vsh_run *run, vsh_error *error) {
     const vshi_triangles *triangles = bake->occluders->triangles;

@@ -186,7 +186,7 @@ static vsh_result apply_patterns(const vsh_model *model, const char *path, const
     return VSH_OK;
 }
 
-/* Sets *chosen [mesh count] to 1 for each selected mesh; to be freed, also after an error. Errors:
+/* Sets *chosen [mesh count] to 1 for each selected mesh; to be freed, even after an error. Errors:
  * VSH_ERROR_INPUT (a pattern matches nothing, or no mesh is left); VSH_ERROR_ARGUMENT (a pattern is NULL);
  * VSH_ERROR_MEMORY. */
 static vsh_result select_meshes(const vsh_model *model, const char *path, const vsh_selection *selection,

@@ -152,7 +152,7 @@ static void light_assets(vsh_scene *scene, bool writes) {
     scene->has_ambient = 1;
 }
 
-/* Checks the arguments, reads the scene's files and lists its lightmaps. Free the bake also after an error.
+/* Checks the arguments, reads the scene's files and lists its lightmaps. Free the bake even after an error.
  */
 static vsh_result load(vshi_scene_bake *bake, const vsh_scene *scene, const vsh_bake_options *options,
                        const vsh_run *run, bool forecast, vsh_error *error) {

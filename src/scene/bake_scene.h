@@ -84,7 +84,7 @@ typedef struct vshi_channels {
 } vshi_channels;
 
 /* Names the channels of a scene at a size, without memory for values. Errors: VSH_ERROR_ARGUMENT (more than
- * VSH_MAX_CHANNELS), VSH_ERROR_MEMORY. Free them also after a failure. */
+ * VSH_MAX_CHANNELS), VSH_ERROR_MEMORY. Free them even after a failure. */
 vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t height, vshi_channels *channels,
                               vsh_error *error);
 
@@ -118,7 +118,7 @@ typedef struct vshi_page_group {
 } vshi_page_group;
 
 /* Takes memory for `count` lightmaps. Planes without room lie in files beside the first one's output. Close
- * the group also after an error. Errors: as vshi_store_take(). */
+ * the group even after an error. Errors: as vshi_store_take(). */
 vsh_result vshi_page_group_open(vshi_scene_bake *bake, size_t first, size_t count, vshi_page_group *group,
                                 vsh_error *error);
 void vshi_page_group_close(vshi_page_group *group); /* also zeroed ones */

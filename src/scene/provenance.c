@@ -54,7 +54,7 @@ static vsh_result copy_path(file_list *inputs, const char *path, vsh_error *erro
 }
 
 /* Lists `files`, the files of casters and receivers, then the files beside models (io/model/model.h),
- * readable or not. `scene` may be NULL. Free the inputs also after an error. */
+ * readable or not. `scene` may be NULL. Free the inputs even after an error. */
 static vsh_result find_inputs(const vsh_scene *scene, const char *const *files, size_t file_count,
                               const vsh_run *run, vshi_job *job, file_list *inputs, vsh_error *error) {
     for (size_t i = 0; i < file_count; ++i) {

@@ -304,7 +304,7 @@ vsh_result vsh_model_densities(const vsh_model *model, const char *path, const v
     return VSH_OK;
 }
 
-/* Lists the density factors of a receiver's meshes, to be freed also after an error; NULL: all are 1. */
+/* Lists the density factors of a receiver's meshes, to be freed even after an error; NULL: all are 1. */
 static vsh_result list_densities(const vsh_receiver *receiver, const vshi_asset_place *place,
                                  double **density, vsh_error *error) {
     if (receiver->density_count == 0) {

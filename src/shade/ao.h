@@ -100,13 +100,13 @@ typedef struct vshi_ao_shading {
     bool sphere;  /* all directions count alike, and points need no normals */
 } vshi_ao_shading;
 
-/* Prepares AO for later points. The occluders must outlive the task. Close it also after an error. Errors: as
+/* Prepares AO for later points. The occluders must outlive the task. Close it even after an error. Errors: as
  * vsh_shade_ao(). */
 vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options *options,
                         vshi_ao_shading shading, int32_t isa, vshi_ao_task *task, vsh_error *error);
 void vshi_ao_close(vshi_ao_task *task);
 
-/* Settles and checks resolved options. Fills *task but for layers, kernel and arrays. Close the task also
+/* Settles and checks resolved options. Fills *task but for layers, kernel and arrays. Close the task even
  * after an error. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options, bool sphere,
                            vshi_ao_task *task, vsh_error *error);

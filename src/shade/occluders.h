@@ -94,7 +94,7 @@ vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_
                                   vsh_error *error);
 
 /* Makes occluders of parts. The layers are copied; what they and the parts refer to must outlive the handle,
- * unless it is in `own` (NULL: nothing). The handle takes over the contents of `own`, which are freed also
+ * unless it is in `own` (NULL: nothing). The handle takes over the contents of `own`, which are freed even
  * after an error. Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more
  * layers than VSHI_MAX_LAYERS; as vshi_layer_check()), VSH_ERROR_MEMORY. */
 vsh_result vshi_occluders_make(const vshi_occluder_parts *parts, vshi_occluders_own *own,

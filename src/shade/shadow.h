@@ -30,7 +30,7 @@ typedef struct vshi_shadow_task {
 } vshi_shadow_task;
 
 /* Checks the light, settles and checks resolved options. Fills *task but for layers, kernel and arrays. Close
- * the task also after an error. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
+ * the task even after an error. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_shadow_prepare(const vsh_occluders *occluders, const vsh_light *light,
                                const vsh_shade_options *options, vshi_shadow_task *task, vsh_error *error);
 
@@ -60,7 +60,7 @@ static inline bool vshi_shadow_reaches(const vshi_shadow_task *task, size_t i) {
 /* A vshi_shade_fn of a vshi_shadow_task, for at most VSHI_PIECE points. */
 vshi_shade_fn vshi_shadow_shade;
 
-/* Prepares the shadow of one light for later points. Occluders and light must outlive the task. Close it also
+/* Prepares the shadow of one light for later points. Occluders and light must outlive the task. Close it even
  * after an error. Errors: as vsh_shade_shadow(). */
 vsh_result vshi_shadow_open(const vsh_occluders *occluders, const vsh_light *light,
                             const vsh_shade_options *options, int32_t isa, vshi_shadow_task *task,

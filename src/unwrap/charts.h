@@ -102,7 +102,7 @@ typedef struct vshi_patch {
     double low[VSHI_ANGLES][2], size[VSHI_ANGLES][2]; /* box of `uv` at each angle, once straightened */
 } vshi_patch;
 
-/* Owns `triangles` from now on, also after a failure; uv is 0. Free with vshi_patch_free(), after a failure
+/* Owns `triangles` from now on, even after a failure; uv is 0. Free with vshi_patch_free(), after a failure
  * too. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_patch_make(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count,
                            vshi_patch *patch, vsh_error *error);

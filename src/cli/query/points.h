@@ -31,7 +31,7 @@ typedef struct cli_points_reader {
 } cli_points_reader;
 
 /* Opens a file, or standard input for "-", and reads its header. `normals`: 1 requires them, 0 ignores them,
- * -1 reads them if there are any. Close it also after a failure. */
+ * -1 reads them if there are any. Close it even after a failure. */
 int cli_points_open(const char *path, int32_t format, int normals, bool strict, cli_points_reader *reader);
 
 /* Reads up to points->room rows; fewer at the end, or if they have more than `most_kept` bytes. */

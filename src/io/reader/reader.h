@@ -87,7 +87,7 @@ typedef bool vshi_poll_fn(void *user, double fraction);
 VSHI_SHARED vsh_result vshi_exchange_begin(vshi_exchange *exchange, int32_t kind, const char *path,
                                            const vsh_run *run, vsh_error *error);
 
-/* Starts the reader, waits for its end, and passes its warnings on. Ends the request, also after a failure.
+/* Starts the reader, waits for its end, and passes its warnings on. Ends the request, even after a failure.
  * Errors: those of the reader; VSH_ERROR_READ (it crashed, or its answer is bad), VSH_ERROR_LIMIT (time,
  * memory), VSH_ERROR_ARGUMENT (the program is missing, or no reader), VSH_ERROR_CANCELLED. */
 VSHI_SHARED vsh_result vshi_exchange_send(vshi_exchange *exchange, vshi_poll_fn *poll, void *user,
