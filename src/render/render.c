@@ -244,7 +244,7 @@ typedef struct hits {
     double lifted[TILE_SAMPLES][3];  /* of rays to the current light, */
     double marched[TILE_SAMPLES][3]; /* and of marches through the field */
     float normals[TILE_SAMPLES][3];
-    float faces[TILE_SAMPLES][3]; /* normals of the triangles; on a field the same */
+    float faces[TILE_SAMPLES][3]; /* normals of the triangles; on a field, those of `normals` */
     uint32_t texels[TILE_SAMPLES];
     float visibility[TILE_SAMPLES];
     float ao[TILE_SAMPLES];
@@ -814,7 +814,7 @@ done:
 
 /* --- 8 bits */
 
-/* Interleaved gradient noise in [0, 1), other places for each channel: neighbourhoods hold all levels (J.
+/* Interleaved gradient noise in [0, 1), shifted for each channel: small neighbourhoods contain all levels (J.
  * Jimenez, "Next generation post processing in Call of Duty: Advanced Warfare", 2014). */
 static double find_mask(int32_t column, int32_t row, int channel) {
     const double place = 0.06711056 * (column + 17 * channel) + 0.00583715 * (row + 31 * channel);

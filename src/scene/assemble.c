@@ -18,7 +18,7 @@
 
 /* --- one level set of several casters */
 
-/* Casters: all, all that have voxels, or of these those of one layer; or one. */
+/* Selects all casters, those with voxels, those with voxels in one layer, or a single one. */
 typedef struct selection {
     const vsh_scene *scene;
     const vsh_assets *assets;
@@ -42,12 +42,12 @@ static size_t count_selected(const selection *s) {
     return count;
 }
 
-/* Memory of a scene and of its assembly, measured with 65,536 casters of one node; with the rest of their
- * text. */
+/* Memory that a caster takes in the scene, its file's text and the assembly, measured with 65,536 casters of
+ * one node. */
 enum { BYTES_PER_CASTER = 1536 };
 
-/* An sdf caster ready for voxels: a tree in world space, or a mirrored one (which no quaternion turns) that
- * its grid's instance mirrors. */
+/* An sdf caster ready for voxels: a tree in world space. No quaternion can mirror a tree, so a mirrored one
+ * keeps its own space, and its grid's instance mirrors it. */
 typedef struct placed_sdf {
     vsh_sdf_node *nodes; /* owned; NULL: the caster's own */
     vsh_sdf sdf;
@@ -129,7 +129,7 @@ static void grow_box(assembly *a, const double min[3], const double max[3], cons
     }
 }
 
-/* Grows the box by a caster; `tree` and its transform if it is one. */
+/* Grows the box by a caster. `tree` and `transform` are those of a procedural shape. */
 static void grow_by_caster(assembly *a, const vsh_caster *caster, const vshi_asset_place *place,
                            const vsh_sdf *tree, const double *transform) {
     for (size_t k = 0; k < place->count; ++k) {
@@ -201,7 +201,7 @@ vsh_result vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets, 
 }
 
 /* Chooses the voxel size on which casters of several kinds must agree before the first is voxelised. A
- * resolution of 0 stands for the finest level set's; alone it stays as it is. */
+ * resolution of 0 stands for the voxels of the finest level set. A level set alone keeps its voxels. */
 static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
     vsh_grid_options *o = &a->options;
     if (o->resolution == 0) {
@@ -474,8 +474,8 @@ static vsh_result add_traced(const selection *of, size_t i, const vsh_run *run, 
     return VSH_OK;
 }
 
-/* Makes triangles that own the solids, or if `solids` is not NULL both apart. Procedural solids alone then
- * need no Embree. */
+/* Makes triangles that own the solids. If `solids` is not NULL, makes the two apart, so that procedural
+ * solids alone need no Embree. */
 static vsh_result trace_casters(const selection *of, const vsh_run *run, vshi_triangles **triangles,
                                 vshi_solids **solids, vsh_error *error) {
     vshi_solids *made = NULL;

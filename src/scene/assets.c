@@ -23,7 +23,7 @@ typedef enum file_kind { MODEL, GRID, HEIGHTS } file_kind;
 
 typedef struct vshi_asset_file {
     file_kind kind;
-    const char *path, *name; /* the scene's, used while loading; name: of a grid, or NULL */
+    const char *path, *name; /* from the scene, used while loading; name: of a grid, or NULL */
     vsh_model *model;
     vshi_masks *masks; /* of the model's textures */
     vsh_grid *grid;
@@ -304,9 +304,9 @@ static vsh_result add_chosen(vshi_asset_place *place, const vsh_model *model, co
     return VSH_OK;
 }
 
-/* Adds the chosen meshes as they cast. Meshes that `parts`, a receiver of the same model, has unwrapped come
- * from there, so that a mesh that casts and receives is one; NULL: none. A mesh with holes keeps the UVs of
- * its texture. */
+/* Adds the chosen meshes as they cast. If `parts`, a receiver of the same model or NULL, has unwrapped a
+ * mesh, takes its parts, so that the mesh that casts equals the one that receives. A mesh that a texture cuts
+ * keeps the UVs of that texture. */
 static vsh_result add_casting(vshi_asset_place *place, const unsigned char *chosen,
                               const vshi_asset_place *parts, const vsh_run *run, vsh_error *error) {
     const vsh_model *model = place->model;
@@ -560,8 +560,8 @@ static vsh_result place_receiver(vsh_assets *assets, const vsh_scene *scene, siz
 
 /* --- solids and sheets: the scene's rules decide, or the shape of the mesh */
 
-/* Applies the rules of one caster, or of all, each by objects' names, or where none is called so, by those of
- * materials. Each must match something. */
+/* Applies the rules of one caster, or of all. A pattern that matches no object's name is tried with
+ * materials' names. Each rule must match something. */
 static vsh_result apply_rules(const vsh_solidity_rule *rules, size_t rule_count, vshi_asset_place *casters,
                               size_t count, vsh_error *error) {
     for (size_t r = 0; r < rule_count; ++r) {

@@ -11,7 +11,7 @@
 #include <vdbshade/lightmap.h>
 #include <vdbshade/scene.h>
 
-/* Makes a scene's lights of those of a model's file. Lights of files have no size: directional ones get
+/* Makes a scene's lights from those of a model's file. Lights of files have no size: directional ones get
  * `angle` (angular diameter, radians, 0 … π, excluded); points, which become spheres, and spots get `radius`
  * (world units, ≥ 0). Points and spots get VSH_FALLOFF_INVERSE_SQUARE; ranges are ignored. Colours are colour
  * × intensity. In names, characters that a light's name cannot have become _; lights without a name are
@@ -77,13 +77,13 @@ typedef struct vshi_receiver_pages {
     uint32_t *memory;         /* positions, normals and indices of the parts */
 } vshi_receiver_pages;
 
-/* One caster or receiver. Its transform is in front of its meshes' own. */
+/* One caster or receiver. Its transform is applied after its meshes' own. */
 typedef struct vshi_asset_place {
     vsh_mesh *meshes;
     double *transforms;      /* [count][12] */
-    const double *transform; /* these two in front of the meshes' own; they do not outlive the scene */
-    double scale;
-    size_t *numbers; /* [count]: of each in its model */
+    const double *transform; /* applied after the meshes' own; lives as long as the scene */
+    double scale;            /* applied between the two */
+    size_t *numbers;         /* [count]: of each in its model */
     size_t count;
     struct vshi_asset_file *file; /* of mesh casters and receivers; belongs to the assets, as the next two */
     const vsh_model *model;       /* that of the file */
@@ -125,7 +125,7 @@ void vshi_receiver_pages_free(vshi_receiver_pages *pages);
 
 /* --- which of a file's meshes a caster or receiver takes */
 
-/* The same of a list of patterns: *chosen is 1 for each mesh that one of them matches, of none of them for
+/* Sets *chosen [mesh count] to 1 for each mesh that one of the patterns matches. Without patterns it chooses
  * no mesh. */
 vsh_result vshi_select_some(const vsh_model *model, const char *path, const char *const *patterns,
                             size_t count, unsigned char **chosen, vsh_error *error);
@@ -146,7 +146,7 @@ typedef struct vshi_masks vshi_masks;
 vsh_result vshi_masks_create(const vsh_model *model, const char *path, vshi_masks **masks, vsh_error *error);
 void vshi_masks_free(vshi_masks *masks);
 
-/* Frees what can be made anew, four bytes a texel. */
+/* Frees the tables, four bytes a texel, which can be made again. */
 void vshi_masks_trim(vshi_masks *masks);
 
 /* Finds the views that a mesh of the model casts as: none, one or two. Triangles that their mask leaves whole
@@ -165,9 +165,9 @@ vsh_result vshi_masks_cast(vshi_masks *masks, size_t mesh, const vsh_run *run, v
 /* How a mesh with a blended material casts. */
 typedef enum vshi_blend {
     VSHI_BLEND_GLASS,
-    VSHI_BLEND_CUT_OUT, /* as masked ones are: nearly all of its texture is clear or opaque, and there is some
-                           of both. So exporters make hashed leaves */
-    VSHI_BLEND_NOTHING  /* as opaque ones: vshi_material.by_texture, without holes */
+    VSHI_BLEND_CUT_OUT, /* as masked ones: nearly all of its texture is clear or opaque, and there is some of
+                           both. Exporters write leaves with hashed alpha like that */
+    VSHI_BLEND_NOTHING  /* like opaque ones: vshi_material.by_texture, without holes */
 } vshi_blend;
 
 /* Warnings and errors: as above. */

@@ -92,7 +92,8 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
 vsh_result vshi_channels_allocate(vshi_channels *channels, const vsh_scene *scene, vshi_store *store,
                                   const char *output, vsh_error *error);
 
-/* The planes that a scene's bake fills are not NULL here. They cannot be written to. */
+/* Returns a lightmap in which the planes that a scene's bake fills are not NULL. Nothing may be written to
+ * them. */
 vsh_lightmap vshi_channels_shape(const vsh_scene *scene);
 
 void vshi_channels_free(vshi_channels *channels); /* also zeroed ones */
@@ -163,7 +164,7 @@ typedef struct vshi_part_front {
     uint64_t active_voxels, field_bytes; /* of the casters, as in vsh_occluders_info */
     double voxel_size;
     int32_t levels, has_triangles;
-    int32_t layered_ao; /* as of the job */
+    int32_t layered_ao; /* as in vshi_scene_bake */
     int32_t shard, shard_count;
     int32_t unused;
 } vshi_part_front;

@@ -368,7 +368,7 @@ enum {
     TEXT = 1 << VSH_CASTER_TEXT
 };
 
-/* By type: the key that tells it, and what messages call it. */
+/* The key that gives a caster each type, which is also the type's name in messages. */
 static const char *const keys[] = {[VSH_CASTER_MESH] = "mesh",       [VSH_CASTER_SDF] = "sdf",
                                    [VSH_CASTER_VDB] = "vdb",         [VSH_CASTER_HEIGHTFIELD] = "heightfield",
                                    [VSH_CASTER_SPHERES] = "spheres", [VSH_CASTER_MASK] = "mask",

@@ -115,7 +115,7 @@ static vsh_result make_caster(const vsh_flat_caster *caster, const vsh_run *run,
     }
 }
 
-/* Memory of a scene and of its outlines, with the rest of its text: measured with 60,000 casters. */
+/* Memory that a caster takes in the scene, its file's text and the outlines, measured with 60,000 casters. */
 enum { BYTES_PER_CASTER = 1536 };
 
 vsh_result vshi_flat_scene_casters(const vsh_flat_scene *scene, const vsh_run *run, vsh_outline **outline,

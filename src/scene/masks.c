@@ -25,14 +25,14 @@ typedef struct material {
         NOTHING, /* all of it is clear */
         BY_MASK
     } state;
-    bool binary; /* its texture is, and its factor leaves it so */
+    bool binary; /* its texture is binary, and its factor keeps it so */
     vsh_alpha_mask mask;
     vshi_mask_table table; /* NULL sums: not made yet */
 } material;
 
 /* The alpha of a shape's vertex colours, which is linear over a triangle. */
 typedef struct vertex_alpha {
-    bool uniform;  /* all vertices have `factor`, a factor as the material's is */
+    bool uniform;  /* all vertices have the alpha `factor` */
     double factor; /* 0 … 1; 1 for alphas that are not finite */
     bool binary;   /* nearly all vertices are clear or opaque, and there are some of both */
     float *uvs;    /* [count][2], for mask_by_vertices(); NULL if uniform */
@@ -105,8 +105,8 @@ void vshi_masks_free(vshi_masks *masks) {
 
 /* --- alpha of vertices */
 
-/* Whether alphas of 8 bits are those of a cut-out, whose edges are few texels wide. Smoke and glass have
- * values between everywhere. */
+/* Whether alphas of 8 bits look like a cut-out's, whose edges are few texels wide. Smoke and glass have
+ * values in between everywhere. */
 static bool is_binary(const uint8_t *alpha, size_t count) {
     static const double BETWEEN = 0.25, SOME = 0.01;
     enum { CLEAR = 25, OPAQUE = 230 };

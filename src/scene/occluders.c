@@ -84,8 +84,9 @@ static caster_counts count_casters(const vsh_scene *scene, const vsh_scene_layer
     return n;
 }
 
-/* Whether auto traces the layer's casters. It marches masks and texts alone, and one level set alone, which
- * keeps its voxels so: several, or one beside other casters, would be resampled to the voxels of all. */
+/* Whether auto traces the layer's casters. It marches a layer of masks and texts only, and a layer of one
+ * level set only, which then keeps its voxels: several, or one beside other casters, would be resampled to
+ * common voxels. */
 static bool is_traceable(const vsh_scene *scene, const vsh_scene_layer *layer) {
     const caster_counts n = count_casters(scene, layer);
     const bool alone = (n.level_sets == 0) != (n.outlines == 0) && n.level_sets <= 1;
@@ -109,7 +110,8 @@ int32_t vshi_scene_marches(const vsh_scene *scene, const vsh_scene_layer *layer)
 
 /* Estimates the rays that adaptive casts on the field of the layer's casters, from each shaded point. */
 static double estimate_field_rays(const vsh_scene *scene, const vsh_scene_layer *layer) {
-    /* over max_error, of all points; measured on the cloister, 0.6 units of AO and a sun of 5° */
+    /* rays × max_error, mean of all points; measured on the cloister with AO within 0.6 units and a sun of
+     * 5° */
     static const double OF_LIGHT = 0.14, OF_AO = 0.6;
     const int32_t can = is_traceable(scene, layer);
     const int32_t method = vshi_shadow_method_resolve(find_method(scene, layer), can);
@@ -184,8 +186,8 @@ int32_t vshi_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, 
     const int32_t otherwise = vsh_grid_options_default().resolution;
     const size_t lights = layer == NULL || layer->lights == NULL ? scene->light_count : layer->light_count;
     if (vshi_scene_marches(scene, layer) != 0) {
-        /* voxels can follow all shapes but meshes, which may be too thin, and level sets, which have theirs
-         */
+        /* voxels can follow all shapes except for meshes, which may be too thin, and level sets, which have
+         * their own voxels */
         const caster_counts n = count_casters(scene, layer);
         const bool follow =
             n.meshes + n.level_sets == 0 && !any_method_is(scene, layer, VSH_METHOD_KEEPS_ERROR, false);
@@ -239,8 +241,8 @@ static const double LEAST_LOST = 0.005;
 /* Size of voxels that hold a part, over the part's thickness. */
 static const double HELD = 0.8;
 
-/* Warns of parts of a caster's meshes that its field has lost. Only then it takes triangles, which tell the
- * parts' thickness. */
+/* Warns of parts of a caster's meshes that its field has lost. If there are any, makes triangles to measure
+ * how thick the parts are. */
 static vsh_result warn_lost(const vsh_caster *caster, const vsh_mesh *meshes, size_t count,
                             const vsh_field *field, const vsh_run *run, vsh_error *error) {
     vshi_lost *lost = NULL;
@@ -307,7 +309,7 @@ static vsh_result warn_of_voxels(const vsh_scene *scene, const vsh_assets *asset
 
 /* --- occluders */
 
-/* Default distance of points around the casters' box, its diagonals. */
+/* Default distance of points from the casters' box, as a multiple of its diagonal. */
 static const double WITHIN = 4.0;
 
 typedef struct occluder_build {
@@ -356,7 +358,7 @@ static vshi_field_options choose_field_options(const occluder_build *m, const vs
         options.grown = 0.0; /* its voxels are the definition */
     }
     if (layer != NULL) {
-        options.reach *= fmax(1.0, layer->softness); /* lights are as much wider */
+        options.reach *= fmax(1.0, layer->softness); /* wider lights need more reach */
     }
     return options;
 }
@@ -426,7 +428,7 @@ static vsh_result make_triangles(occluder_build *m, const vsh_scene_layer *layer
         return VSH_OK;
     }
     VSHI_TRY(vshi_scene_triangles(m->scene, m->assets, layer, &m->run, triangles, error));
-    /* methods need triangles even if all casters are in layers */
+    /* the methods need triangles, even empty ones if all casters are in layers */
     return *triangles == NULL && layer == NULL
                ? vshi_triangles_create(NULL, 0, NULL, &m->run, triangles, error)
                : VSH_OK;

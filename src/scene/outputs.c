@@ -59,7 +59,7 @@ static void make_safe(const char *name, char safe[NAME_BYTES + 1]) {
         whole -= whole > 0;
     }
     while (name[length] != '\0' && length > 0 && ((unsigned char)name[length] & 0xc0) == 0x80) {
-        --length; /* no half of a character */
+        --length; /* do not cut a character in two */
     }
     for (size_t end = length; end > 0 && (safe[end - 1] == ' ' || safe[end - 1] == '.'); --end) {
         safe[end - 1] = '_';
@@ -185,7 +185,7 @@ vsh_result vshi_list_lightmaps(vshi_scene_bake *bake, vsh_error *error) {
 
 /* --- channels */
 
-/* Whether the scene asks for a kind of plane: by its lights, AO and what belongs to them, or by a wish. */
+/* Whether the scene asks for a kind of plane: by its lights, its AO and their options, or in vsh_planes. */
 static bool is_asked(const vshi_plane_kind *kind, const vsh_scene *scene) {
     /* remaining errors: only of methods that know them */
     const bool shadow_error =
@@ -271,7 +271,7 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
     return VSH_OK;
 }
 
-/* Puts the values into the planes of a lightmap; `values` NULL: any value. */
+/* Sets a lightmap's planes to the values. With `values` NULL, sets the planes to any pointer but NULL. */
 static void bind_planes(vsh_lightmap *lightmap, const vsh_scene *scene, float *const *values) {
     static float plane;
     float *const any[] = {&plane};

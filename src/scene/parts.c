@@ -212,7 +212,7 @@ static vsh_result move_tile(part_file *f, const vshi_scene_page *page, size_t ti
     VSHI_TRY(move_bytes(f, &p->stats[tile], sizeof *p->stats, error));
     VSHI_TRY(move_bytes(f, &p->errors[tile * p->error_count], p->error_count * sizeof *p->errors, error));
     VSHI_TRY(move_array(f, page, &at, p->state, sizeof *p->state, error));
-    for (size_t k = 0; k < at.columns * at.rows; ++k) { /* an index of tables */
+    for (size_t k = 0; k < at.columns * at.rows; ++k) { /* states index tables */
         if (p->state[find_texel(page, &at, k)] > VSHI_TEXEL_INVALID) {
             return fail_damaged(f->path, "its tiles", error);
         }

@@ -5,9 +5,9 @@
 
 #include <vdbshade/picture.h>
 
-/* The standard error that the values of a channel ("ao", "sky", "shadow.NAME") were made to, as attributes
- * say that a file carries; NaN where they don't, or where a limit of rays was given, by which it may be
- * missed. Cannot fail. */
+/* Returns the standard error that the values of a channel ("ao", "sky", "shadow.NAME") were made to, by the
+ * attributes of their file. NaN if these do not say, or if a limit of rays was given, so that values may miss
+ * it. Cannot fail. */
 double vshi_provenance_max_error(const vsh_attribute *attributes, size_t count, const char *channel);
 
 /* A row's option: name, word for the value, VSH_SETTINGS_…, help, and other members that are not 0. */
@@ -32,7 +32,7 @@ vsh_result vshi_read_flat_caster(vshi_json *reader, const vshi_value *value, voi
 
 /* A "transform" object into double[12]. Errors: also a transform that flattens. */
 vsh_result vshi_read_transform(vshi_json *reader, const vshi_value *value, void *matrix);
-/* Finds the key that an object has of these, -1: none. Fails if it has two. */
+/* Finds which of these keys an object has; -1: none. Fails if it has two. */
 vsh_result vshi_read_type(vshi_json *reader, const vshi_value *object, const char *const *names,
                           int32_t count, int32_t *type);
 /* A pattern, or an array of them, as a vshi_list. */

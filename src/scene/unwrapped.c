@@ -12,7 +12,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Share of a mesh's triangles without area in the UVs: exporters make some of slivers. */
+/* Largest share of a mesh's triangles that may lack area in the UVs: exporters make such triangles of
+ * slivers. */
 static const double LARGEST_DEGENERATE = 0.01;
 
 int32_t vshi_receiver_unwrap(const vsh_receiver *receiver) {
