@@ -50,7 +50,7 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
  * by eye; too dark in corners. */
 static void shade_by_taps(const void *user, size_t begin, size_t end, vsh_shade_stats *stats) {
     const vshi_ao_task *task = user;
-    /* his distances 0.01 … 0.13, scaled to the AO distance */
+    /* Quilez's distances 0.01 … 0.13, scaled to the AO distance */
     static const double FIRST = 0.01, LAST = 0.13, FADE = 0.95, STRENGTH = 3.0;
     const double unit = task->distance / LAST;
     const double reach = (double)task->field->levels[task->field->level_count - 1].band;

@@ -106,7 +106,7 @@ vsh_result vshi_ao_open(const vsh_occluders *occluders, const vsh_shade_options 
                         vshi_ao_shading shading, int32_t isa, vshi_ao_task *task, vsh_error *error);
 void vshi_ao_close(vshi_ao_task *task);
 
-/* Settles and checks resolved options. Fills *task but for layers, kernel and arrays. Close the task even
+/* Settles and checks resolved options. Fills *task except for layers, kernel and arrays. Close the task even
  * after an error. Errors: VSH_ERROR_ARGUMENT, VSH_ERROR_MEMORY. */
 vsh_result vshi_ao_prepare(const vsh_occluders *occluders, const vsh_shade_options *options, bool sphere,
                            vshi_ao_task *task, vsh_error *error);
@@ -171,7 +171,7 @@ bool vshi_ao_frame_at(const vshi_ao_task *task, size_t i, vshi_ao_frame *frame, 
 /* vshi_frame() of a unit vector, and the vector. */
 void vshi_ao_axes(vshi_vec normal, vshi_vec axes[3]);
 
-/* The face normal of point i, or `normal` if both are the same but for rounding. */
+/* The face normal of point i, or `normal` if the two differ by rounding only. */
 vshi_vec vshi_ao_face(const vshi_ao_task *task, size_t i, vshi_vec normal);
 
 /* Turns a direction from the frame's axes to their space. */
@@ -202,8 +202,8 @@ void vshi_ao_bent(float *bent, const float *normal);
 double vshi_ao_spread(int32_t sampler, int32_t rays);
 
 /* The variance if texels share their rays. The same edge runs through neighbouring texels, so the means over
- * windows err a little more than independent texels would (test_claims: a slit, 0.88 of its error would be
- * claimed). */
+ * windows err a little more than independent texels would. (Without the factor, the claimed error at a slit
+ * in test_claims would be 0.88 of the true one.) */
 static inline double vshi_ao_shared_spread(int32_t sampler, int32_t rays) {
     return 1.15 * vshi_ao_spread(sampler, rays);
 }

@@ -14,7 +14,7 @@
 
 enum { BALLS = 4 };
 
-/* A ball around a place up the normal that the field says is free. */
+/* A ball around a place above a point, along its normal, that is free of casters by the field. */
 typedef struct free_ball {
     double height, square; /* of its centre above the origin; its squared radius */
 } free_ball;
@@ -72,7 +72,7 @@ static void add_free(point_rays *point, vshi_vec direction) {
     point->open = vshi_add(point->open, direction);
 }
 
-/* Sorts rays by direction, so that neighbours meet the same boxes and triangles. */
+/* Sorts rays by direction, so that successive rays meet the same boxes and triangles. */
 static void order(const ray_piece *b, uint16_t of[VSHI_CHUNK]) {
     uint16_t start[KEYS + 1] = {0};
     for (size_t r = 0; r < b->traced_count; ++r) {
@@ -268,7 +268,7 @@ static void limit_dome(const vshi_ao_task *task, point_rays *point, vshi_vec up,
     }
 }
 
-/* Prepares a point. False if there is nothing to shoot, as its value is known. */
+/* Prepares a point. False if its value is known, so that no rays are needed. */
 static bool prepare(const ray_piece *b, size_t i, point_rays *point, vsh_shade_stats *stats) {
     const vshi_ao_task *task = b->task;
     const vsh_points *points = task->points;
@@ -507,9 +507,10 @@ void vshi_ao_by_rays(const void *user, size_t begin, size_t end, vsh_shade_stats
 enum { TILE = 8, FIRST = 8, BEYOND = 16 };
 
 /* Second rays of all texels of a tile whose first rays differ: a power of two, at least this over max_error.
- * A few rays tell badly how many more a texel needs. With the first rays alone, the cloister at 0.01 had an
- * RMSE of 0.0061 in a time that gives 0.0053. Lattices wider than CLOSE keep to the first rays: their error
- * is mostly the bend between texels, and its estimate counts on the noise (test_ao_texels: fine texels). */
+ * From a few rays it is hard to predict how many more a texel needs. With the first rays alone, the cloister
+ * at 0.01 had an RMSE of 0.0061 in a time that gives 0.0053. Lattices wider than CLOSE keep to the first
+ * rays: their error is mostly the bend between texels, and the estimate of the bend needs the noise of few
+ * rays (test_ao_texels: fine texels). */
 static const double SEEN_OVER = 0.4;
 static const int32_t MOST_SEEN = 128, CLOSE = 2;
 
@@ -564,7 +565,7 @@ static bool decide_tile(ray_piece *piece, tile *t, int32_t most) {
     vshi_window_estimate estimates[TILE * TILE];
     for (size_t i = 0; i < piece->count; ++i) {
         point_rays *point = &piece->points[i];
-        if (point->next == 0) { /* testing known texels again takes the time that it gains */
+        if (point->next == 0) { /* testing known texels again costs as much time as it saves */
             continue;
         }
         point->next = 0;
@@ -736,8 +737,8 @@ static bool is_straight(const tile *t, const vshi_window_estimate *e, int32_t at
     return fabs(off) <= most + SIGMAS * sqrt(before * before + own * own + after * after);
 }
 
-/* Refines texels at the end of a square if they predict the next texel, in another square, badly. Its first
- * rays tell. */
+/* Refines texels at the end of a square if they predict the next texel, in another square, badly. Shoots a
+ * few rays from that texel to find out. */
 static void grade_ends(const vshi_ao_task *task, const int32_t square[2], const tile *t,
                        const vshi_window_estimate *e, vsh_shade_stats *stats) {
     const vshi_ao_share *share = task->share;

@@ -5,9 +5,9 @@
  * cover the beam up to the light, they cover each cone. If a solid ball is as wide as the beam, it hides
  * every ray.
  *
- * Near its points a beam holds their own surface. There each point is on its own, with the ball that touches
- * its tangent plane. This ball holds the rays of its cone from next to the point to where the beams of its
- * neighbours are clear of the surface. */
+ * Near its points, a beam contains the points' own surface. There each point uses the ball that touches
+ * its tangent plane. This ball contains the rays of the point's cone up to where the beam is clear of the
+ * surface. */
 #include "shade/shadow.h"
 
 #include <math.h>
@@ -15,9 +15,9 @@
 enum { SIZES = 3, SMALLEST = 4 };
 static const size_t SIZE[SIZES] = {64, 16, SMALLEST}; /* points of a block */
 
-/* Wider beams hold too much for proofs, voxels. */
+/* Wider beams, voxels, contain too much geometry for proofs. */
 static const double WIDEST = 24.0;
-/* Cones this short, voxels, are worth a try with smaller blocks. */
+/* For cones this short, voxels, smaller blocks are worth a try. */
 static const double SHORT = 48.0;
 /* Height of the centre of the ball above a point, voxels: as much as the finest level's band holds. The
  * radius is less by NEAR_LACK, and rays enter the ball by then. */
@@ -29,8 +29,8 @@ static const double DEEPER = 0.25, READ = 0.71;
 
 /* --- the ball above each point */
 
-/* Tests every point, whatever its neighbours prove: the begin of a march decides its samples. `improved`
- * depends most on its first samples, and begins at the surface. */
+/* Tests every point, whatever its neighbours prove: the samples of a march depend on where it begins.
+ * `improved` depends most on its first samples, and begins at the surface. */
 static void prove_near(const vshi_shadow_task *task, vshi_facing *facing, vsh_shade_stats *stats) {
     static const double LEAST_SINE = 0.1; /* of the cone's lowest ray over the plane */
     float centres[3][VSHI_PIECE];

@@ -22,18 +22,19 @@ enum {
  * rays, must be baked. */
 static const double MAJORITY = 0.72;
 
-/* Between these shares of MORE, more rays are cast. */
+/* If the share of rays that say inside is between these, more rays are cast. */
 static const double UNCLEAR[2] = {0.5, 0.95};
 
 /* Linked points have normals with at least this cosine. */
 static const double ALIKE = 0.9;
 
-/* The same share if the COUNTED rays say inside and a first ray does not. Under the mouth of a pipe whose
- * faces look inwards, three rays enter the pipe, and more than half escape. */
+/* MAJORITY of points where all COUNTED rays say inside, but a first ray does not. Under the mouth of a pipe
+ * whose faces look inwards, three rays enter the pipe, and more than half escape. */
 static const double AGREED = 2.0 / 3.0;
 
-/* Rays begin a little off the surface, so on the wrong side of closer triangles. Points found inside that
- * have such a triangle begin at this part of the distance: some roundings of a float. */
+/* Rays begin a little off the surface, and so on the wrong side of triangles that are closer. Points that are
+ * found inside and have such a triangle are tested again from this part of the distance, which is some
+ * roundings of a float. */
 static const double NEARER = 0.25;
 
 /* Directions over a hemisphere around +z, a golden angle apart, from 18° to 75° off the normal. None lies
@@ -137,7 +138,7 @@ static uint8_t count_through(const solid_test *l, size_t point) {
     return VSHI_INSIDE;
 }
 
-/* For a point whose first rays all begin in solids with holes: whether the second rays do too. */
+/* For a point whose first rays all begin in solids with holes: whether the second rays do, too. */
 static uint8_t confirm(const solid_test *l, size_t point) {
     vshi_segment_ray rays[SECOND];
     uint8_t meets[SECOND];

@@ -15,9 +15,9 @@ typedef struct vshi_layer {
     const char *name;                /* NULL: none */
     const vsh_field *field;          /* NULL if `heights` or `spheres` cast without AO */
     const vshi_triangles *triangles; /* for exact methods; NULL: none */
-    const vshi_heights *heights; /* these two cast in closed form, at most one of them; AO takes the field */
-    const vshi_spheres *spheres; /* and the triangles */
-    int32_t method;              /* the rest as in vsh_scene_layer */
+    const vshi_heights *heights;     /* at most one of these two casts in closed form; */
+    const vshi_spheres *spheres;     /* AO uses the field and the triangles */
+    int32_t method;                  /* the rest as in vsh_scene_layer */
     int32_t combine;
     double softness;
     double remap[2];
@@ -40,7 +40,7 @@ static inline bool vshi_layer_is_closed(const vshi_layer *layer) {
     return layer->heights != NULL || layer->spheres != NULL;
 }
 
-/* What a handle is made of. Views: nothing is owned. */
+/* The parts of a handle. Views: nothing is owned. */
 typedef struct vshi_occluder_parts {
     const vsh_field *field; /* casters in no layer; NULL: they are known by their triangles alone, or all
                                casters are in layers */

@@ -333,7 +333,8 @@ void vshi_shade_irradiance(const vsh_points *points, const float *shading_normal
 
 /* --- chunks of cones on their way to the kernel */
 
-/* Rays begin a sixteenth of a voxel on. The field is not known better, so h / t means nothing before. */
+/* Rays begin a sixteenth of a voxel from their origin. The field is not more accurate, so h / t means nothing
+ * before. */
 static const double FIRST_STEP = 0.0625;
 /* Clipping cones shorter than this, voxels, costs more than it saves. */
 static const double SHORT = 32.0;

@@ -126,8 +126,8 @@ bool vshi_shade_origin(const vsh_field *field, const vsh_points *points, size_t 
 /* The growth of casters for rays that begin at a point of field space, voxels: at most field->grown. */
 double vshi_shade_grown(const vsh_field *field, vshi_vec origin);
 
-/* Whether rays from there are traced against the field's surface: it exists, is grown by no more than the
- * rays may see, and has them outside. */
+/* Whether rays from there are traced against the field's surface. It must exist, be grown by no more than
+ * vshi_shade_grown(), and the rays must begin outside of it. */
 bool vshi_shade_traces(const vsh_field *field, vshi_vec origin);
 
 /* A point on a triangle, world space. Shadow rays begin on the triangle, or are lifted towards the smooth
@@ -171,7 +171,7 @@ void vshi_layers_free(vshi_layers *layers); /* NULL does nothing */
 
 enum { VSHI_OUTSIDE = 0, VSHI_INSIDE = 1 };
 
-/* A field that tells points in the open: places at least so far from all casters. */
+/* A field that finds points in the open: those at least `least` away from all casters. */
 typedef struct vshi_open_field {
     const vsh_field *field;
     const vshi_vec *at; /* [points]: near them, field space */
