@@ -296,8 +296,8 @@ done:
 
 /* --- casters */
 
-/* A point at most so many cells below the surface counts as on it: receivers are float meshes, whose
- * triangles may differ from the heights'. */
+/* A point that is no more cells below the surface than this counts as on it: receivers are meshes of floats,
+ * whose triangles may differ from the heights. */
 static const double UNDER = 0.25;
 /* A step is this share of the height over the ground, and at least so many cells. */
 static const double STEP = 0.25, LEAST_STEP = 0.25;

@@ -115,10 +115,10 @@ void vshi_contours_add(vshi_contours *contours, double x, double y);
 /* Ends the contour, and drops it if it has fewer than three points. */
 void vshi_contours_close(vshi_contours *contours);
 
-/* Makes an outline of the contours, and frees them. `clean`: each contour is a border of the area already, as
- * they neither cross nor nest with the same sense. Others are resolved by the nonzero rule. `what` names the
- * outline in messages. Errors: that of the contours; VSH_ERROR_INPUT without an area, VSH_ERROR_LIMIT,
- * VSH_ERROR_MEMORY. */
+/* Makes an outline of the contours, and frees them. `clean`: every contour is a border of the area, because
+ * contours neither cross nor nest with the same sense. Otherwise the nonzero rule decides what is inside.
+ * `what` names the outline in messages. Errors: that of the contours; VSH_ERROR_INPUT without an area,
+ * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_contours_finish(vshi_contours *contours, bool clean, const char *what, vsh_outline **outline);
 
 struct vshi_decoder;

@@ -182,7 +182,7 @@ static void march_cell(border *b, int64_t i, int64_t k) {
         const double middle =
             0.25 * (sample(b, i, k) + sample(b, i + 1, k) + sample(b, i + 1, k + 1) + sample(b, i, k + 1));
         const bool joined = (middle >= b->threshold) != b->invert;
-        /* ends[j] follows begins[j] if the first crossing is a begin, else begins[1 - j] */
+        /* ends[j] follows begins[j] if the first crossing is one of `begins`, else begins[1 - j] */
         const int shift = (first >= 0) != joined;
         add_step(b, begins[0], ends[shift]);
         add_step(b, begins[1], ends[1 - shift]);

@@ -495,7 +495,7 @@ static bool attach_mesh(vshi_triangles *triangles, const vshi_mesh_set *set, siz
     return vertices != NULL && corners != NULL;
 }
 
-/* Fails with the reason that the limit, the job or Embree's `code` gives. */
+/* Fails because of the memory limit, a cancelled job or Embree's `code`. */
 static vsh_result fail_by(const vshi_triangles *triangles, enum RTCError code, vshi_job *job,
                           vsh_error *error) {
     if (atomic_load(&triangles->refused)) {

@@ -428,7 +428,7 @@ static inline void place_on_domes(const group *g, float x[PACKET], float y[PACKE
     }
 }
 
-/* The same on domes. */
+/* Aims the lanes at places of their domes. */
 static inline void aim_at_domes(group *g, float x[PACKET], float y[PACKET], int valid[PACKET]) {
     struct RTCRay16 *r = &g->ray;
     if (g->leans) {

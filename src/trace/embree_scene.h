@@ -80,7 +80,7 @@ struct vshi_triangles {
     uint32_t *first;                         /* number of each geometry's first triangle */
     uint8_t *solid;                          /* [count]: VSHI_SOLID_… */
     size_t *cells;                           /* of the meshes: of terrains, which are quads; else 0 */
-    bool has_solids, has_holes, has_vessels; /* any triangle has such */
+    bool has_solids, has_holes, has_vessels; /* whether any triangle has that flag */
     bool wide;                               /* 16 rays are traced at once, not in two halves */
     double low[3], high[3]; /* the triangles' box, world space; low > high if there are none */
     bool fine; /* quads smaller than the gaps between a packet's rays: a quarter faster one by one */

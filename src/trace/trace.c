@@ -173,8 +173,8 @@ static int32_t count_free(const vshi_truth *truth, const viewpoint *from, const 
     return free;
 }
 
-/* Whether rays agree with an expected value. Few rays that agree with each other only are not enough: they
- * miss small casters, always to one side. */
+/* Whether rays agree with an expected value. It is not enough that a few rays agree with each other: all may
+ * miss a small caster, which always errs to the same side. */
 static bool agrees(double free, double count, double expected) {
     static const double ENOUGH = 1e-3;
     return fabs(free - expected * count) < ENOUGH * count;

@@ -64,7 +64,7 @@ static inline double vshi_side_length(const vshi_cut_mesh *s, uint32_t side) {
 vsh_result vshi_grow_charts(const vshi_cut_mesh *surface, vshi_job *job, uint32_t *chart_of,
                             uint32_t *chart_count, vsh_error *error);
 
-/* A binary heap, the least key first. Ties go by number, so the order of pushing does not show. */
+/* A binary heap, the least key first. Numbers break ties, so the order of pushing does not matter. */
 typedef struct vshi_heap_entry {
     double key;
     uint32_t what, by;
@@ -97,7 +97,7 @@ typedef struct vshi_patch {
     double (*uv)[2];       /* [vertex_count], surface units: as much area as the triangles have */
     double area;           /* surface units² */
     double stretch;        /* L2, see vsh_atlas_chart */
-    bool kept;             /* uv are the mesh's own, and of any area */
+    bool kept;             /* uv are the mesh's own, so their area may be anything */
     uint32_t depth;        /* how often it was cut out of another */
     double low[VSHI_ANGLES][2], size[VSHI_ANGLES][2]; /* box of `uv` at each angle, once straightened */
 } vshi_patch;
@@ -133,8 +133,8 @@ void vshi_patches_free(vshi_patches *patches);
 vsh_result vshi_patches_split(const vshi_patch *patch, const uint32_t *part, uint32_t parts, vshi_patches *to,
                               vsh_error *error);
 
-/* Lays triangles (ascending, owned from now on) out as one chart, or as many as it takes so that none folds
- * or stretches beyond the limit; adds them to `patches`. Errors: VSH_ERROR_MEMORY. */
+/* Lays triangles (ascending, owned from now on) out as one chart, or as several if one would fold or stretch
+ * beyond the limit. Adds the charts to `patches`. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_lay_out(const vshi_cut_mesh *surface, uint32_t *triangles, uint32_t count, double max_stretch,
                         vshi_patches *patches, vsh_error *error);
 
@@ -223,9 +223,9 @@ vsh_result vshi_patch_straighten(vshi_patch *patch, vsh_error *error);
 /* Whether a patch nearly fills its box at angle 0: other angles do not help then. */
 bool vshi_patch_is_box(const vshi_patch *patch);
 
-/* Fits a patch at an angle and so many texels to its unit. A patch that nearly fills its box becomes a whole
- * number of texels wide and high, if its stretch stays within the limit. Its borders then lie near texels'
- * centres, so that a lookup between texels inside of it reads its own texels alone. */
+/* Fits a patch at an angle, with `density` texels to its unit. A patch that nearly fills its box becomes a
+ * whole number of texels wide and high, if its stretch stays within the limit. Its borders then lie near
+ * texels' centres, so that a lookup between texels inside of it reads its own texels alone. */
 vshi_fit vshi_mask_fit(const vshi_patch *patch, int angle, double density, double max_stretch);
 
 /* The texels that triangles of the patch touch with more than their border. Free with vshi_mask_free(), after
@@ -242,7 +242,7 @@ void vshi_bits_set(uint64_t *row, int32_t begin, int32_t end);
 /* The first bit from x on that is `value`, else `width`. */
 int32_t vshi_bits_next(const uint64_t *row, int32_t x, int32_t width, bool value);
 
-/* A point of the fit in the mask turned so: texels from its corner. */
+/* Turns a point of the fit as vshi_mask_turn() turns the mask: texels from the turned mask's corner. */
 void vshi_fit_turn(const vshi_fit *fit, int quarters, const double uv[2], double at[2]);
 
 /* --- charts packed into pages (pack.c) */
@@ -259,7 +259,7 @@ typedef struct vshi_place {
 typedef struct vshi_pack_item {
     const vshi_patch *patch; /* straightened */
     double factor;           /* texels to a unit of the patch at a density of 1 */
-    uint32_t mesh;           /* that has the chart */
+    uint32_t mesh;           /* mesh that has the chart */
     vshi_place at;
 } vshi_pack_item;
 
@@ -267,7 +267,7 @@ typedef struct vshi_packing {
     int32_t width, height, padding;
     uint32_t max_pages;
     double max_stretch;
-    double density; /* as given, or 0; then as found */
+    double density; /* as given, or 0: then the one found */
     uint32_t pages; /* used */
 } vshi_packing;
 
@@ -280,7 +280,7 @@ double vshi_pack_bytes(const vshi_packing *packing, size_t count);
 vsh_result vshi_pack(vshi_packing *packing, vshi_pack_item *items, size_t count, vshi_job *job, size_t units,
                      vsh_error *error);
 
-/* The same at the given density, on one page. *fits tells whether there was room; if not, the items are
+/* Packs at the given density, on one page. *fits tells whether there was room; if not, the items are
  * unchanged. Errors: VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_pack_one(vshi_packing *packing, vshi_pack_item *items, size_t count, vshi_job *job,
                          bool *fits, vsh_error *error);

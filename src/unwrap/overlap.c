@@ -1,8 +1,8 @@
-/* Whether a flat chart lies over itself. Three tests, as none finds everything. A hole that is turned inside
- * out runs the wrong way. Borders that cross are found by a sweep along u: a chart without flipped triangles
- * that overlaps has such borders, unless they meet only in corners and along each other, as on regular grids.
- * A raster, about as fine as the triangles, finds the latter: each of its points lies in one triangle at
- * most. */
+/* Whether a flat chart lies over itself. Three tests, because none finds everything. A hole that is turned
+ * inside out runs the wrong way. Borders that cross are found by a sweep along u: a chart without flipped
+ * triangles that overlaps has such borders, unless they meet only in corners and along each other, as on
+ * regular grids. A raster, about as fine as the triangles, finds the latter: each of its points lies in one
+ * triangle at most. */
 #include "unwrap/charts.h"
 
 #include "base/memory.h"

@@ -43,7 +43,7 @@ enum { LEAST_TURNED = 40 };               /* texels: shorter charts are turned b
 enum { IMPATIENT = 3000, PATIENCE = 24 }; /* charts; rows */
 enum { HINT_SIDE = 128 }; /* texels: larger charts are few, and search from the first row on */
 
-/* Share of a page's texels that padded charts may have for it to be tried. */
+/* Largest share of a page's texels that padded charts may have: with more, a page is not even tried. */
 static const double HOPE = 0.95;
 
 /* --- pages. All columns of a row are tested at once: bit x of `forbidden` says that a mask at x meets a
@@ -126,7 +126,7 @@ typedef struct needs {
     int32_t row[NEEDS], length[NEEDS];
     int32_t count;
     int32_t least; /* free run that every row needs */
-    bool boxy;     /* `least` is nearly the most */
+    bool boxy;     /* `least` is over half of the mask's width */
 } needs;
 
 static needs needs_of(const vshi_mask *mask) {
@@ -153,7 +153,7 @@ static bool may_fit(const atlas_page *page, const needs *n, int32_t y) {
     return true;
 }
 
-/* The first row from y on at which each row of the mask may find a free run that is long enough. */
+/* The first row from y on at which the mask's rows may find free runs that are long enough. */
 static int32_t find_next_row(const atlas_page *page, const vshi_mask *mask, const needs *n, int32_t y,
                              int32_t limit) {
     while (y + mask->height <= limit) {

@@ -11,8 +11,8 @@
 
 static const char what[] = "a chart";
 
-/* Cuts should run where surfaces bend. So paths get longer by so many sizes of the chart for each radian or
- * so between the normals of two triangles. */
+/* Cuts should run where surfaces bend. So about every radian between the normals of two triangles lengthens a
+ * path by this many sizes of the chart. */
 static const double BEND = 1.0;
 
 /* After so many cuts, a chart falls into its triangles: it is no surface. */

@@ -82,8 +82,8 @@ static int compare_meshes(const void *a, const void *b) {
     return arrays != 0 ? arrays : (x->index > y->index) - (x->index < y->index);
 }
 
-/* first[i]: the first mesh that mesh i is an instance of. Addresses do not show in it: meshes of one set of
- * arrays are compared in their order. */
+/* first[i]: the first mesh that mesh i is an instance of. It does not depend on addresses: meshes of one set
+ * of arrays are compared in their order. */
 static vsh_result find_first(const vsh_mesh *meshes, size_t count, size_t *first, vsh_error *error) {
     array_set *sorted = NULL;
     VSHI_TRY(vshi_allocate((void **)&sorted, count, sizeof *sorted, what, error));

@@ -106,11 +106,12 @@ static vsh_result make_items(const vshi_shapes *shapes, size_t mesh_count, const
 /* --- pages: all charts are packed together, or those of each object onto a page of its own. Then pages
  * shrink as far as their charts allow. */
 
-/* Relative difference of the factors of charts that are packed alike: scales of instances are roots of sums.
- */
+/* Charts whose factors differ by less than this share are packed alike: the scales of instances are roots of
+ * sums, and round. */
 static const double SAME_FACTOR = 1e-9;
 
-/* Most share of a page's texels that charts may touch for it to be tried: the rest is padding. */
+/* Largest share of a page's texels that charts may touch, because the rest is padding. With more, a page is
+ * not even tried. */
 static const double MOST_TOUCHED = 0.98;
 
 enum {
