@@ -95,9 +95,9 @@ static place place_of(const vshi_json *reader, size_t at) {
     return found;
 }
 
-/* Returns the begin of a value, or of its `key`. Counts members instead of comparing names, so that escapes
- * in keys need no decoding: Jansson keeps the order of the text and rejects duplicates. If the text has no
- * such path, returns the last place on it. */
+/* Returns where a value, or its `key`, begins. Counts members instead of comparing names, so that escapes in
+ * keys need no decoding: Jansson keeps the order of the text and rejects duplicates. If the text has no such
+ * path, returns the last place on it. */
 static place locate(const vshi_json *reader, const vshi_value *value, bool key) {
     size_t ordinals[MAX_DEPTH];
     while (value->depth > MAX_DEPTH) {

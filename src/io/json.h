@@ -39,8 +39,8 @@ typedef vsh_result vshi_read_fn(vshi_json *reader, const vshi_value *value, void
  * Errors: VSH_ERROR_INPUT, VSH_ERROR_MEMORY, those of `read`. */
 vsh_result vshi_json_parse(vshi_json *reader, size_t size, vshi_read_fn *read, void **made);
 
-/* Does the same with the file at the reader's path, on a stack that is large enough. Needs the reader's run.
- * Errors: also VSH_ERROR_READ, VSH_ERROR_LIMIT (64 MiB, run->memory_limit). */
+/* Reads the file at the reader's path and parses it in the same way, on a stack that is large enough. Needs
+ * the reader's run. Errors: also VSH_ERROR_READ, VSH_ERROR_LIMIT (64 MiB, run->memory_limit). */
 vsh_result vshi_json_read(vshi_json *reader, size_t size, vshi_read_fn *read, void **made);
 
 /* Frees such a struct with all its memory. NULL does nothing. */

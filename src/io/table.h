@@ -35,7 +35,7 @@ vsh_result vshi_source_line(vshi_source *source, const char **line, size_t *size
 
 /* --- the header of a PLY (G. Turk, "The PLY polygon file format", 1994) */
 
-/* Types of numbers. Lower ones are whole numbers; every second of them is unsigned. */
+/* Types of numbers. Lower ones are whole numbers of 1, 1, 2, 2, 4 and 4 bytes; odd ones are unsigned. */
 enum { VSHI_PLY_FLOAT = 6, VSHI_PLY_DOUBLE = 7 };
 
 enum { VSHI_PLY_PROPERTIES = 256, VSHI_PLY_ELEMENTS = 32, VSHI_PLY_NAME = 64 };
@@ -104,8 +104,8 @@ enum { VSHI_TABLE_COLUMNS = 6 };
 typedef struct vshi_table_columns {
     const char *names[VSHI_TABLE_COLUMNS]; /* of any case in CSV */
     int count;
-    int needed; /* the first so many. The others are read if a file has all of them, but never of raw floats
-                 */
+    int needed; /* number of required ones, which come first. The others are read if a file has all of them,
+                   but never from raw floats */
 } vshi_table_columns;
 
 typedef struct vshi_table {
@@ -121,7 +121,7 @@ typedef struct vshi_table {
     int8_t *column_of;                 /* [fields of a row]: the column, or -1 */
     /* rows of text */
     char delimiter;    /* between fields: a character, or VSHI_BETWEEN_BLANKS */
-    int fields, width; /* that a row needs; of the first line */
+    int fields, width; /* fields that a row needs; fields of the first line */
     /* rows of bytes */
     size_t row_size;                                          /* 0: of text */
     int offset[VSHI_TABLE_COLUMNS], type[VSHI_TABLE_COLUMNS]; /* of the columns: bytes, types as of PLY */

@@ -163,7 +163,7 @@ static bool aim_beam(const vshi_shadow_task *task, const vshi_facing *facing, bl
     if (b->distance > 0.0) {
         b->tilt = tilt_of(task, facing, b);
     }
-    /* from the first begin of a cone to the last end */
+    /* from where the first cone begins to where the last one ends */
     beam->begin = b->ends = INFINITY;
     beam->end = -INFINITY;
     if (!vshi_shadow_has_rays(&task->options)) {

@@ -164,7 +164,7 @@ vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
     setup.error_handler_fn = keep_message;
     setup.user_data = &log;
-    /* a file without its table of chunks is cut; guessing the chunks would hide that */
+    /* a file without its table of chunks is cut short; guessing the chunks would hide that */
     setup.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
 
     vsh_result result = VSH_OK;

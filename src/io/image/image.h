@@ -17,24 +17,24 @@ double vshi_srgb_to_linear(double encoded);
  */
 typedef struct vshi_image_writer vshi_image_writer;
 
-/* Begins the file that vsh_image_write() would write: the same bytes, for the same values. image->planes is
- * not looked at; names are copied. Same errors, and VSH_ERROR_ARGUMENT for writer NULL. End with
+/* Begins the file that vsh_image_write() would write: the same bytes, for the same values. Ignores
+ * image->planes, and copies names. Errors: the same, and VSH_ERROR_ARGUMENT if `writer` is NULL. End with
  * vshi_image_writer_finish() or vshi_image_writer_abandon(). */
 vsh_result vshi_image_writer_create(const char *path, const vsh_image *image,
                                     const vsh_image_options *options, vshi_image_writer **writer,
                                     vsh_error *error);
 
-/* The next `rows` rows from the top, `planes` [channel_count][rows × width]. Errors: VSH_ERROR_ARGUMENT
- * (more rows than are left, or fewer than 1; a plane NULL), VSH_ERROR_WRITE, VSH_ERROR_UNSUPPORTED,
- * VSH_ERROR_MEMORY; after one, nothing but vshi_image_writer_abandon() is of use. */
+/* Writes the next `rows` rows from the top, `planes` [channel_count][rows × width]. Errors:
+ * VSH_ERROR_ARGUMENT (more rows than are left, or fewer than 1; a plane NULL), VSH_ERROR_WRITE,
+ * VSH_ERROR_UNSUPPORTED, VSH_ERROR_MEMORY; after one, only vshi_image_writer_abandon() may be called. */
 vsh_result vshi_image_writer_add(vshi_image_writer *writer, int32_t rows, const float *const *planes,
                                  vsh_error *error);
 
-/* Puts the file in place and frees the writer, also where it fails; the old file is then as it was. Errors:
- * VSH_ERROR_ARGUMENT (rows are missing), and as vshi_image_writer_add(). */
+/* Puts the file in place, and frees the writer. If this fails, the old file stays and the writer is freed,
+ * too. Errors: VSH_ERROR_ARGUMENT (rows are missing), and as vshi_image_writer_add(). */
 vsh_result vshi_image_writer_finish(vshi_image_writer *writer, vsh_error *error);
 
-/* Frees the writer; the old file is as it was. NULL does nothing. */
+/* Frees the writer; the old file stays. NULL does nothing. */
 void vshi_image_writer_abandon(vshi_image_writer *writer);
 
 /* Returns the most bytes that writing takes beside the planes: some rows, or the whole image if OpenImageIO
@@ -79,8 +79,8 @@ typedef struct vshi_image_bytes {
     const char *format; /* its name in OpenImageIO */
 } vshi_image_bytes;
 
-/* Does the same as vsh_image_read() for a PNG, JPEG or WebP in memory, which messages call `name`. `run` is
- * resolved. Errors: also VSH_ERROR_UNSUPPORTED (another format). */
+/* Reads a PNG, JPEG or WebP in memory like vsh_image_read(). Messages call it `name`. `run` is resolved.
+ * Errors: also VSH_ERROR_UNSUPPORTED (another format). */
 vsh_result vshi_image_read_bytes(const char *name, const void *bytes, size_t size, const vsh_run *run,
                                  vsh_image_file **file, vsh_error *error);
 
@@ -150,7 +150,7 @@ static inline float vshi_plane_at(const vshi_planes *planes, const vshi_image_pl
     return plane->encode != NULL ? plane->encode(value) : value;
 }
 
-/* The same as stored in integers: 0 … 1, before it is cut. */
+/* Returns the value as integers store it: 0 … 1, before it is cut. */
 static inline float vshi_plane_unit_at(const vshi_planes *planes, const vshi_image_plane *plane, size_t at) {
     const float value = vshi_plane_at(planes, plane, at);
     return plane->is_signed ? 0.5f + 0.5f * value : value;

@@ -35,10 +35,10 @@ struct Format {
     vshi_format format; // its name is OpenImageIO's
 };
 
-// Formats without bits are read only. Sizes are the formats' own limits; jpeg's is lower, because libjpeg
-// ends the process above its own. webp drops the colour of transparent pixels, so it counts as a format
-// without alpha. `held` comes from measured peak memory: 4096² pixels, written eight rows at a time.
-// OpenImageIO 2.4 knows more formats, but does not tell if a disk is full, or reads cut files as whole.
+// Formats without bits can be read, but not written. Sizes are the formats' own limits; jpeg's is lower,
+// because libjpeg ends the process above its own. webp drops the colour of transparent pixels, so it counts
+// as a format without alpha. `held` comes from measured peak memory: 4096² pixels, written eight rows at a
+// time. OpenImageIO 2.4 knows more formats, but does not tell if a disk is full, or reads cut files as whole.
 constexpr vshi_format TIFF = {"tiff", BITS_ALL, true, false, ANY_SIZE, 0.0};
 constexpr vshi_format JPEG = {"jpeg", VSHI_BITS_8, false, false, 65500, 0.3};
 constexpr Format formats[] = {
@@ -258,7 +258,7 @@ OIIO::ImageSpec make_spec(const vshi_planes &planes, const std::string &format, 
     spec.attribute("Software", std::string("vdbshade ") + vsh_version());
     spec.attribute("oiio:UnassociatedAlpha", 1); // else colours are divided by alpha
     if (format == "tiff") {
-        spec.attribute("DateTime", "1970:01:01 00:00:00"); // else the hour: same input, same bytes
+        spec.attribute("DateTime", "1970:01:01 00:00:00"); // fixed: same input, same bytes
     }
     spec.attribute("oiio:BitsPerSample", static_cast<int>(type.size()) * 8);
     if (format == "jpeg") {

@@ -398,7 +398,7 @@ static void name_material(vshi_lit_work *work, json_t *material, size_t number, 
 }
 
 /* Makes the material of a look: in place of the old one if nobody has taken that, else a new one. Replaced
- * ones wait in changed[], as others are still copied from the old ones. */
+ * ones wait in changed[], because others are still copied from the old ones. */
 static vsh_result make_material(vshi_lit_work *work, vshi_lit_look *look, bool *taken, json_t **changed,
                                 vsh_error *error) {
     json_t *material =

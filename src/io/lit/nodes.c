@@ -92,8 +92,8 @@ static vsh_result list_uses(vshi_lit_work *work, bool *seen, uses *all, vsh_erro
     return VSH_OK;
 }
 
-/* How often a node shows its mesh: once, or for all instances. All accessors of instances have one length, as
- * the model's reader has checked. */
+/* Counts how often a node shows its mesh: once, or once for each instance. All accessors of instances have
+ * one length, as the model's reader has checked. */
 static vsh_result count_instances(vshi_lit_work *work, const use *u, size_t *count, vsh_error *error) {
     vshi_gltf *gltf = &work->gltf;
     const json_t *attributes = json_object_get(
@@ -182,7 +182,7 @@ static vsh_result make_mesh(vshi_lit_work *work, uses *all, use *u, vsh_error *e
         return result;
     }
     if (all->unlit[u->mesh] == 0 && all->changed[u->mesh] == NULL) {
-        all->changed[u->mesh] = mesh; /* replaced later: others are still made of the old one */
+        all->changed[u->mesh] = mesh; /* replaced later, because others are still made from the old one */
         u->made = u->mesh;
     } else {
         u->made = vshi_lit_append(work, "meshes", mesh);

@@ -36,7 +36,7 @@ typedef struct vshi_lit_dracos {
     vshi_answer answer; /* the reader's; its map may be NULL */
 } vshi_lit_dracos;
 
-/* How a primitive is to look: a material of the file with the images of a page, in a set of UVs. */
+/* The look of a primitive: a material of the file with the images of a page, in a set of UVs. */
 typedef struct vshi_lit_look {
     size_t material; /* SIZE_MAX: none, which is white */
     uint32_t page;
@@ -88,7 +88,7 @@ typedef struct vshi_lit_work {
     vshi_gltf gltf;              /* arrays of its root only grow until it is written */
     char *text;         /* of the file, with the binary chunk; NULL: the document is made of the model */
     json_t *own_images; /* the file's own, in their places; NULL: none */
-    bool pruned;        /* bytes that no buffer view has may go */
+    bool pruned;        /* bytes outside of all buffer views may be dropped */
     bool refused;       /* memory for the JSON was refused: the document must not be written */
     vshi_lit_dracos dracos;
     struct {
@@ -210,8 +210,8 @@ void vshi_lit_set_bounds(vshi_lit_work *work, json_t *accessor, const vshi_gltf_
 vsh_result vshi_lit_add_indices(vshi_lit_work *work, const uint32_t *indices, size_t count,
                                 size_t vertex_count, size_t *accessor, vsh_error *error);
 
-/* --- Draco (draco.c): decoded by the reader's process, if there is one, as Draco is a large decoder of
- * strangers' bytes */
+/* --- Draco (draco.c): decoded in the reader's process, if there is one, because Draco is large and its bytes
+ * are a stranger's */
 
 /* Decodes all primitives under the extension into work->dracos. Errors: VSH_ERROR_INPUT, VSH_ERROR_READ,
  * VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -287,7 +287,7 @@ vsh_result vshi_lit_make_nodes(vshi_lit_work *work, vsh_error *error);
 /* Fills the document with the model, lit. (from_model.c) */
 vsh_result vshi_lit_from_model(vshi_lit_work *work, vsh_error *error);
 
-/* Appends to `list` what a primitive becomes, itself or one for each page. `entry` is its mesh in the model.
+/* Appends the lit primitive to `list`: one, or one for each of its pages. `entry` is its mesh in the model.
  * (primitive.c, as the functions below) */
 vsh_result vshi_lit_make_primitive(vshi_lit_work *work, size_t mesh, size_t primitive, size_t entry,
                                    json_t *list, vsh_error *error);

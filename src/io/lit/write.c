@@ -301,8 +301,9 @@ static void move_part(const writing *w, json_t *part, size_t *numbers, json_t *l
     vshi_lit_set_number(work, part, "buffer", numbers[buffer] - 1);
 }
 
-/* Makes one buffer of all bytes, in the file w->bin or (NULL) in the document. It is the first that had any.
- * Buffers without bytes (EXT_meshopt_compression's fallback) stay if views refer to them. */
+/* Makes one buffer of all bytes, in the file w->bin or (NULL) in the document. That is the first buffer with
+ * bytes, or a new one. Buffers without bytes (EXT_meshopt_compression's fallback) stay if views refer to
+ * them. */
 static vsh_result join_buffers(writing *w, vsh_error *error) {
     vshi_lit_work *work = w->work;
     vshi_gltf *gltf = &work->gltf;
@@ -511,7 +512,7 @@ static void write_vertices(FILE *to, const obj_mesh *m) {
         const vshi_vec at = vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * v));
         const uint16_t *color = m->lit->colors != NULL ? m->lit->colors + 4 * v : NULL;
         fprintf(to, "v %.9g %.9g %.9g", at.x, at.y, at.z);
-        for (int c = 0; color != NULL && c < 3; ++c) { /* sRGB, as Blender and MeshLab take them */
+        for (int c = 0; color != NULL && c < 3; ++c) { /* sRGB, which Blender and MeshLab expect */
             fprintf(to, " %.5g", vshi_to_srgb(color[c] / 65535.0));
         }
         fputc('\n', to);
@@ -635,7 +636,7 @@ static vsh_result check_mtl(const char *path, vsh_error *error) {
 
 /* --- files */
 
-/* Finds the paths of all files, and checks that none of them may not be replaced. */
+/* Finds the paths of all files, and checks that all of them may be written. */
 static vsh_result name_files(writing *w, vsh_error *error) {
     const size_t named = w->besides->count + (w->bin != NULL);
     const vshi_array arrays[] = {VSHI_ARRAY(w->files, named + 1), VSHI_ARRAY(w->outputs, named + 1),

@@ -96,7 +96,8 @@ static vsh_result scan_stl(assimp *scan, vshi_text *text, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Collada: the unit of the asset ("<unit meter="0.01"/>"). Assimp multiplies by it, and does not tell it. */
+/* Collada: the unit of the asset ("<unit meter="0.01"/>"). Assimp multiplies by it, but does not report
+ * it. */
 
 /* Reads meter="NUMBER" between `at` and `end`; 0: it is absent or no number. XML allows blanks around "=". */
 static double read_metres(const char *at, const char *end) {
@@ -342,7 +343,7 @@ static vsh_result add_nodes(assimp *source, vsh_model *model, const struct aiNod
     return VSH_OK;
 }
 
-/* Copies the materials' names. Whether they are blended is known of each mesh. */
+/* Copies the materials' names, and from the meshes whether their materials are blended. */
 static vsh_result copy_materials(const assimp *source, vsh_model *model, vsh_error *error) {
     const struct aiScene *scene = source->scene;
     VSHI_TRY(vshi_model_add_materials(model, scene->mNumMaterials, error));

@@ -219,7 +219,7 @@ static void cut_ear(cut *p, uint32_t ear, int demand) {
     --p->left;
 }
 
-/* Cuts the last three corners, in their first order. */
+/* Cuts the last three corners, in their order around the polygon. */
 static void cut_last(cut *p) {
     uint32_t rest[3];
     size_t found = 0;

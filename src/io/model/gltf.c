@@ -38,7 +38,7 @@ const json_t *vshi_gltf_element(const vshi_gltf *gltf, const char *array, size_t
 }
 
 bool vshi_gltf_count(const json_t *object, const char *key, size_t fallback, size_t *value) {
-    static const double most = 9007199254740992.0; /* whole numbers of a double */
+    static const double most = 9007199254740992.0; /* 2^53: doubles hold all whole numbers up to this */
     const json_t *given = json_object_get(object, key);
     *value = fallback;
     if (given == NULL) {

@@ -63,12 +63,12 @@ enum {
  * an angle or a radius of the caller's. */
 typedef struct vshi_model_light {
     const char *name;    /* the node's, else the light's; NULL where neither has one */
-    int32_t type;        /* VSH_MODEL_LIGHT_… */
+    int32_t type;        /* VSHI_MODEL_LIGHT_… */
     double position[3];  /* world, metres */
     double direction[3]; /* world, of length 1: the way it shines, away from it; of a point 0, 0, 0 */
     double color[3];     /* linear RGB, ≥ 0, without the intensity */
     double intensity;    /* ≥ 0: lux, of a directional one at normal incidence; else candela */
-    double range;        /* metres, where it is said to end; 0: nowhere */
+    double range;        /* metres, where the file lets it end; 0: it does not end */
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle; else 0 */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π / 2; else 0 */
 } vshi_model_light;
@@ -176,7 +176,7 @@ vsh_result vshi_model_add(vsh_model *model, const char *path, const vsh_run *run
 vsh_result vshi_model_add_light(vsh_model *model, const vshi_model_light *light, const char *name,
                                 vsh_error *error);
 
-/* Copies a text to one line. Errors: VSH_ERROR_MEMORY. */
+/* Copies a text as one line. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_model_copy_line(const char *text, char **copy, vsh_error *error);
 
 /* Returns the number of the next object. */
@@ -232,7 +232,7 @@ vsh_result vshi_unsupported_check(const char *path, vsh_error *error);
 /* Gets the path of such a file and frees it, after an error too. */
 typedef vsh_result vshi_beside_fn(void *user, char *path, vsh_error *error);
 
-/* Calls `add` for the files that are read with a model, for some more than once: buffers of a glTF, also
+/* Calls `add` for the files that are read with a model, for some more than once: buffers of a glTF, even
  * missing ones; textures of materials that are not opaque; material libraries of an OBJ and their masks.
  * Lists files outside of the model's folder only with run->allow_outside. Lists nothing if the file is no
  * model of its ending. The job may cancel this, but is not advanced. Errors: VSH_ERROR_LIMIT,

@@ -138,7 +138,7 @@ static const struct {
 
 /* --- the model */
 
-/* Each mesh ends at the begin of the next. */
+/* Each mesh ends where the next one begins. */
 static size_t vertex_end(const vshi_obj *obj, size_t mesh) {
     return mesh + 1 < obj->mesh_count ? obj->meshes[mesh + 1].first_vertex : obj->vertex_count;
 }
@@ -333,7 +333,7 @@ static bool is_over(char c) {
     return is_line_end(c) || c == '#';
 }
 
-/* Returns the begin of the line after c. */
+/* Returns the start of the line after c. */
 static const char *skip_line(vshi_obj *obj, const char *c) {
     for (;; ++c) {
         if (*c == '\\') {

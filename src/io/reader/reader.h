@@ -139,8 +139,8 @@ enum {
 /* The version of the messages' form: raise it with every change. */
 enum { VSHI_READER_PROTOCOL = 8 };
 
-/* The begin of an answer. The reader writes it twice: with code VSHI_ANSWER_BEGUN before it parses, and at
- * the end. */
+/* The head of an answer. The reader writes it twice: with code VSHI_ANSWER_BEGUN before it parses, and at the
+ * end. */
 typedef struct vshi_answer_head {
     uint64_t magic;
     uint32_t protocol;
