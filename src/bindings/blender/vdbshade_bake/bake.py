@@ -32,7 +32,7 @@ class Bake:
         self.receivers = [obj for obj in context.selected_objects if scene.is_caster(obj)]
         self.folder = None
         self.process = None
-        self.layout = None  # while UVs are made
+        self.layout = None  # not None while UVs are made
         self.undo = None
         self.progress = (0.0, "")
         self.warnings = []
@@ -132,7 +132,7 @@ class Bake:
         return image
 
     def keep(self, path, name):
-        """Copies the image beside a saved blend file. Without one it stays, and is packed later."""
+        """Copies the image beside the blend file. If that was never saved, the image stays, and is packed later."""
         if not bpy.data.filepath:
             return path
         target = bpy.path.abspath("//" + bpy.path.clean_name(name) + ".exr")
@@ -225,7 +225,7 @@ def set_nodes(material, image, uv_name, how):
     tree.links.new(picture.outputs["Color"], mix.inputs["Color2"])
     if how == "MULTIPLY":
         tree.links.new(mix.outputs["Color"], base)
-    else:  # EMISSION: as bright as baked, without lights
+    else:  # EMISSION: as bright as baked, even without lights
         glow = shader.inputs.get("Emission Color") or shader.inputs["Emission"]
         tree.links.new(mix.outputs["Color"], glow)
         shader.inputs["Emission Strength"].default_value = 1.0

@@ -43,7 +43,7 @@ class Layout:
                 raise BakeError("'%s': comes from another file, and so cannot have UVs made; make it local" % obj.name)
 
     def part(self):
-        """Gives objects that share a mesh a mesh each: a lightmap has a place for each object."""
+        """Copies meshes that several objects share: each object needs its own place in the lightmap."""
         seen, parted = set(), []
         for obj in self.receivers:
             if obj.data.name in seen:
@@ -76,7 +76,7 @@ class Layout:
             of_corner[corners] = uvs
             cut = numpy.unique(corners[(of_corner[corners] != uvs).any(axis=1)])
             self.set_uvs(obj, of_corner)
-            if len(cut) > 0:  # Blender's faces have one place for each corner
+            if len(cut) > 0:  # a corner of Blender's faces has only one UV
                 self.split(obj, cut, corners.reshape(-1, 3), uvs.reshape(-1, 3, 2))
 
     def split(self, obj, cut, triangles, uvs):

@@ -24,13 +24,13 @@ def is_caster(obj):
 
 
 def keeps_corners(obj, mesh):
-    """Whether modifiers left an object's faces as they are, if not its vertices: each corner is what it was."""
+    """Whether modifiers kept an object's faces, so that corners still match. Vertices may have moved."""
     ours, theirs = (values_of(which.loops, "vertex_index", 1, numpy.int32) for which in (obj.data, mesh))
     return len(obj.data.polygons) == len(mesh.polygons) and numpy.array_equal(ours, theirs)
 
 
 def arrays_of(obj, mesh, uv_name):
-    """Positions, normals (world), UVs or None, and indices of a mesh where its object stands, a vertex a corner."""
+    """Positions, normals (world), UVs or None, and indices of a mesh where its object stands. Each corner is a vertex."""
     mesh.calc_loop_triangles()
     if hasattr(mesh, "calc_normals_split"):  # until Blender 4.1
         mesh.calc_normals_split()
@@ -60,8 +60,8 @@ def arrays_of(obj, mesh, uv_name):
 
 
 def mesh_arrays(obj, depsgraph, uv_name, own_corners):
-    """The arrays of an object as it is rendered; with `own_corners` without modifiers that change its faces, so that a
-    vertex of the arrays is a corner of its mesh."""
+    """The arrays of an object as it is rendered. With `own_corners`, modifiers that change its faces do not apply, so that
+    each vertex of the arrays is a corner of its mesh."""
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -105,7 +105,7 @@ class Glb:
         self.nodes.append({"name": obj.name, "mesh": self.add_mesh(obj.name, points, indices, **attributes)})
 
     def add_instance(self, mesh, matrix, known):
-        """A mesh that casts where an instance of it stands; `known` has the numbers of those that are there."""
+        """Adds an instance of a mesh as a caster. `known` has the numbers of the meshes that were added before."""
         key = mesh.as_pointer()
         if key not in known:
             mesh.calc_loop_triangles()
@@ -132,8 +132,8 @@ class Glb:
 
 
 def write_glb(path, objects, depsgraph, uv_names, own_corners=False, instances=False):
-    """Writes objects, and with `instances` what collections, particles and geometry nodes show of others, as a GLB;
-    returns the names of the objects that have triangles."""
+    """Writes objects as a GLB; with `instances` also the copies that collections, particles and geometry nodes show.
+    Returns the names of the objects that have triangles."""
     glb, there = Glb(), []
     for obj in objects:
         arrays = mesh_arrays(obj, depsgraph, uv_names.get(obj.name), own_corners)

@@ -69,7 +69,7 @@ def names_of(structs: Any, count: int) -> List[str]:
 
 
 def lights_read(path: Path, angle: float, radius: float, unit: float = 0.0, *, run: Optional[Run] = None) -> List[Light]:
-    """The lights of a glTF's file as those of a scene, which have sizes.
+    """The lights of a glTF file as lights of a scene, which have sizes.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def lights_read(path: Path, angle: float, radius: float, unit: float = 0.0, *, r
 
 
 class AlphaMask(Struct, kind="vsh_alpha_mask"):
-    """Where a mesh is cut out by a texture: light comes through where base_alpha × alpha, looked up bilinearly, is below
+    """A texture that cuts holes into a mesh: light comes through where base_alpha × alpha, looked up bilinearly, is below
     alpha_cutoff.
 
     Parameters
@@ -128,8 +128,8 @@ class AlphaMask(Struct, kind="vsh_alpha_mask"):
 
 
 class Mesh(Struct, kind="vsh_mesh"):
-    """A triangle mesh: a view of arrays, which are not copied where they are as below. They must not change while it
-    is used.
+    """A triangle mesh: a view of arrays, which are not copied if they have the types below. They must not change while
+    it is used.
 
     Parameters
     ----------
@@ -152,12 +152,12 @@ class Mesh(Struct, kind="vsh_mesh"):
     alpha : str
         "opaque", "masked", "blended"
     one_sided : bool
-        as a caster, it lets light through that falls on the backs of its faces; methods that march voxels ignore this
+        light on the backs of its faces passes through this caster; methods that march voxels ignore this
     material_name : str, optional
     mask : AlphaMask, optional
         holes
     mask_uvs : array of float32, shape (vertices, 2), optional
-        texture coordinates for the mask, v up; vertices whose coordinates are not finite are opaque
+        texture coordinates for the mask, v up; triangles with coordinates that are not finite are opaque
 
     Notes
     -----
@@ -233,7 +233,7 @@ class Mesh(Struct, kind="vsh_mesh"):
         return report
 
     def measure_uvs(self, width: int, height: int) -> types.UvsMeasures:
-        """How its UVs lie on its surface, in a lightmap of this size (texels)."""
+        """Measures its UVs in a lightmap of this size (texels)."""
         measures: types.UvsMeasures = call(lib.vsh_uvs_measure, self, width, height, OUT)
         return measures
 
@@ -252,7 +252,7 @@ def meshes_of(given: Meshes, name: str = "meshes") -> Tuple[Any, int]:
 
 
 def mesh_solidity(meshes: Meshes, *, run: Optional[Run] = None) -> List[types.SolidityReport]:
-    """Reports for each mesh how many of its pieces are solids, rooms and sheets, if the meshes cast together."""
+    """Counts the solids, rooms and sheets among the pieces of each mesh, if the meshes cast together."""
     structs, count = meshes_of(meshes)
     reports: List[types.SolidityReport] = call(lib.vsh_mesh_solidity, structs, count, Several(count), run=run)
     return reports
@@ -480,13 +480,13 @@ def attributes_of(given: Optional[Attributes]) -> List[Dict[str, str]]:
 
 
 def attribute_structs(given: Optional[Attributes]) -> Tuple[Any, int]:
-    """Attributes as C has them: ``vsh_attribute[]`` and how many."""
+    """Attributes as ``vsh_attribute[]``, and their count."""
     lines = attributes_of(given)
     return structs_of("vsh_attribute", lines), len(lines)
 
 
 class _Distance:
-    """A function of the caller's while a grid is made of it."""
+    """The caller's distance function, while a grid is made from it."""
 
     def __init__(self, function: Callable[[Array], Any]) -> None:
         self.function = function
@@ -542,14 +542,14 @@ class Grid(Handle, kind="vsh_grid"):
         distance : callable
             called with positions, an array of float64 of shape (n, 3) that it may not keep (n is 64, 8 or 1); returns
             signed distances, shape (n,), world units, negative inside. It is called from several threads, one at a
-            time, and has to give the same value for the same position. What it raises, this raises.
+            time, and has to give the same value for the same position. This raises what it raises.
         bounds_min, bounds_max : three floats
             a world box that holds the whole surface
         lipschitz : float
-            bound on how much distances differ over how far positions do; 1 for true distances
+            largest difference of two distances, divided by how far apart their positions are; 1 for true distances
         exact : bool
-            True: a true distance near the surface; False: distances are measured anew, with calls for single positions:
-            ten times as long
+            True: it returns true distances near the surface; False: distances are measured anew, which calls it for single
+            positions and takes ten times as long
         """
         if not callable(distance):
             raise TypeError(f"distance: expected a function, got {type(distance).__name__}")

@@ -123,7 +123,7 @@ _ERRORS = {getattr(lib, "VSH_ERROR_" + word.upper()): kind for word, kind in {
 
 
 def fail(result: int, error: Any) -> None:
-    """Raises what a result other than VSH_OK stands for."""
+    """Raises the exception of a result other than VSH_OK."""
     message = ffi.string(error.message).decode("utf-8", "replace")
     raise _ERRORS.get(result, Error)(message, result)
 
@@ -133,7 +133,7 @@ def text(pointer: Any) -> Optional[str]:
     return None if pointer == ffi.NULL else str(ffi.string(pointer).decode("utf-8", "replace"))
 
 
-# --- numpy arrays as C has them, without a copy if possible, and views of the library's memory
+# --- numpy arrays for C, without a copy if possible, and views of the library's memory
 
 _NAMES = {"f": "float", "d": "double", "I": "uint32_t", "i": "int32_t", "B": "uint8_t"}
 
@@ -228,7 +228,7 @@ def transform(given: Any, name: str = "transform") -> Optional[Array]:
 
 
 def vector(given: Any, length: int, name: str) -> Any:
-    """So many doubles, for C."""
+    """`length` numbers as ``double[]``."""
     return pointer(array(given, numpy.float64, (length,), name))
 
 
@@ -566,7 +566,7 @@ class Run:
         called as ``progress(stage, fraction)`` from the thread that made the call, with a stage's name and a
         fraction 0 … 1; a true result cancels the call, and the call raises what it raises
     interval : float
-        seconds, at least so many apart
+        least seconds between two calls of `progress`
     warning : callable, optional
         called as ``warning(message)``, by whatever thread; None: ``warnings.warn(message, VdbshadeWarning)``
     notes : bool
@@ -577,9 +577,9 @@ class Run:
         True: files are parsed in the library's confined reader (docs/security.md); a path: by that program;
         False: in this process, where a damaged file can crash it
     reader_seconds : float
-        that the reader may take for one file; 0: 60, and one more for each MB
+        seconds that the reader may take for one file; 0: 60, and one more for each MB
     confined : bool
-        nothing is read where the system refuses one of the reader's confinements
+        read nothing if the system refuses one of the reader's confinements
     allow_outside : bool
         a model may name files outside its folder
     memory_held : int
@@ -688,7 +688,7 @@ OUT: Any = object()  # an argument that the library fills: its value is returned
 
 
 class Several:
-    """So many values that the library fills: a tuple, or a list of records."""
+    """Several values that the library fills: a tuple, or a list of records."""
 
     def __init__(self, count: int) -> None:
         self.count = count
@@ -767,7 +767,7 @@ def call(function: Any, *given: Any, run: Optional[Run] = None, keeps: Any = Non
     Parameters
     ----------
     keeps
-        an object to which the new handle refers: it lives as long
+        an object to which the new handle refers, and which it keeps alive
     watched
         an object whose ``raised`` other callbacks set
     """
@@ -827,7 +827,7 @@ class Handle(Struct):
 
     @classmethod
     def _borrow(cls: Type[Kind], cdata: Any, owner: Any) -> Optional[Kind]:
-        """An object for a handle that is another's, which lives as long; None for none."""
+        """An object for a handle that belongs to `owner`, which it keeps alive; None for NULL."""
         if cdata == ffi.NULL:
             return None
         return cls._of(ffi.gc(ffi.cast(ffi.typeof(cdata), cdata), lambda _, keeps=owner: None), owner)

@@ -34,7 +34,7 @@ class AtlasMesh:
     indices : array of uint32, shape (triangles, 3)
         the mesh's triangles in their order
     charts : array of uint32, shape (triangles,)
-        2^32 - 1: of a triangle without area
+        2^32 - 1 for a triangle without area
     """
 
     def __init__(self, struct: Any, owner: Any) -> None:
@@ -46,7 +46,7 @@ class AtlasMesh:
         self.charts = borrowed(struct.charts, (m,), numpy.uint32, owner)
 
     def of(self, mesh: Mesh) -> Mesh:
-        """The mesh that it was made of, with the atlas's vertices and UVs."""
+        """The mesh that it was made from, with the atlas's vertices and UVs."""
         normals = None if mesh.normals is None else mesh.normals[self.sources]
         return Mesh(mesh.positions[self.sources], self.indices, normals=normals, uvs=self.uvs, transform=mesh.transform,
                     name=mesh.name or "mesh", object_name=mesh.object_name, object=mesh.object, solidity=mesh.solidity, alpha=mesh.alpha,
@@ -163,7 +163,7 @@ def lit_write(output: Path, model: Model, images: Sequence[LitImage], *, path: O
 
 
 def lit_is_output(path: Path) -> bool:
-    """Whether a path ends as a file that lit_write() writes."""
+    """Whether a path has the ending of a file that lit_write() can write."""
     return bool(ask(lib.vsh_lit_is_output, path_of(path, "path")))
 
 
@@ -270,7 +270,7 @@ class SceneFile(Struct):
 
 
 class Scene(SceneFile, kind="vsh_scene"):
-    """A scene, of a file (docs/scene.md) or of arguments.
+    """A scene from a file (docs/scene.md) or from arguments.
 
     Parameters
     ----------
@@ -344,7 +344,7 @@ class Scene(SceneFile, kind="vsh_scene"):
         call(lib.vsh_receiver_check, self, index)
 
     def receiver_charts(self, index: int, meshes: Meshes, *, run: Optional[Run] = None) -> Charts:
-        """The charts of a receiver's meshes, as its bake sorts them."""
+        """The charts of a receiver's meshes, as its bake makes them."""
         structs, count = meshes_of(meshes)
         charts = Charts.__new__(Charts)
         charts._begin(call(lib.vsh_receiver_charts, self, index, structs, count, OUT, run=run, keeps=structs), count)
@@ -352,7 +352,7 @@ class Scene(SceneFile, kind="vsh_scene"):
         return charts
 
     def needs_unwrap(self, index: int, meshes: Meshes, *, run: Optional[Run] = None) -> bool:
-        """Whether a receiver's meshes get UVs of their own making."""
+        """Whether a receiver's meshes get new UVs."""
         if not 0 <= index < self.struct.receiver_count:
             raise IndexError(f"receiver {index}: there are {self.struct.receiver_count}")
         return bool(call(lib.vsh_receiver_needs_unwrap, self._receiver(index), *meshes_of(meshes), OUT, run=run))
@@ -386,7 +386,7 @@ class Assets(Handle, kind="vsh_assets"):
         return self._meshes(lib.vsh_assets_receiver, index)
 
     def caster(self, index: int) -> List[Mesh]:
-        """The meshes of a caster; none of one without triangles."""
+        """The meshes of a caster; none for a caster without triangles."""
         return self._meshes(lib.vsh_assets_caster, index)
 
     def casters(self, *, run: Optional[Run] = None) -> Grid:
@@ -486,12 +486,12 @@ def bake_scene(scene: Scene, *, arrays: bool = False, files: Sequence[Any] = (),
     arrays : bool
         return the lightmaps as arrays; False: write files at the receivers' outputs
     files : sequence of paths, optional
-        inputs that outputs name, beside those of the scene
+        inputs that outputs name, in addition to those of the scene
     words : sequence of str, optional
         stored in a part (part_words())
     **options
-        vdbshade.types.BakeOptions: scratch, invalid_picture, lit_preview, shard, shard_count, parts (a part of a
-        bake that machines share), …
+        vdbshade.types.BakeOptions: scratch, invalid_picture, lit_preview, …; shard, shard_count and parts share a
+        bake between machines
     """
     if isinstance(words, str):
         raise TypeError("words: expected a list of str, got str")
@@ -520,7 +520,7 @@ def part_words(parts: Path, shard_count: int = 0, *, run: Optional[Run] = None) 
 
 
 def version() -> str:
-    """The library's, "0.2.0"."""
+    """The library's version, "0.2.0"."""
     return str(ask(lib.vsh_version))
 
 
@@ -532,7 +532,7 @@ def file_digest(path: Path, *, run: Optional[Run] = None) -> str:
 
 
 def reader_confinement(*, run: Optional[Run] = None) -> List[str]:
-    """How the reader that parses files is confined here: of "limits", "calls", "files"."""
+    """How the reader that parses files is confined on this system: some of "limits", "calls", "files"."""
     return words_of_bits("vsh_confinement", call(lib.vsh_reader_confinement, OUT, run=run))
 
 

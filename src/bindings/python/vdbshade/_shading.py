@@ -63,7 +63,7 @@ def shade_shadow(occluders: Occluders, positions: ArrayLike, normals: Optional[A
     texels : array of uint32, shape (n,), optional
         column + 65536 row of each in a lightmap
     out, error : array of float32, shape (n,), optional
-        to be written into: the values, and the standard error left in them
+        arrays to write into: the values, and the standard error left in them
     **options
         vdbshade.types.ShadeOptions: method, max_error, rays, sampler, …
 
@@ -85,7 +85,7 @@ def shade_ao(occluders: Occluders, positions: ArrayLike, normals: ArrayLike, *, 
              **options: "Unpack[types.ShadeOptions]") -> Floats:
     """Cosine-weighted fraction of the hemisphere that is free within ``ao_distance`` (world units), 0 … 1 open.
 
-    Arguments as of shade_shadow(); `bent`, an array of float32 of shape (n, 3), receives bent normals: unit, world space.
+    Arguments as for shade_shadow(); `bent`, an array of float32 of shape (n, 3), receives bent normals: unit, world space.
     """
     points, count = _points(positions, numpy.asarray(normals), texels)
     values = output(out, numpy.float32, (count,), "out")
@@ -217,7 +217,7 @@ def shadow_method_traits(method: types.ShadowMethod) -> List[str]:
 
 
 def ao_method_traits(method: types.AoMethod) -> List[str]:
-    """The traits of an AO method, as of shadow_method_traits()."""
+    """The traits of an AO method, like shadow_method_traits()."""
     return words_of_bits("vsh_method_trait", lib.vsh_method_traits(lib.VSH_NAMES_AO, constant("vsh_ao_method", method, "method")))
 
 
@@ -382,9 +382,9 @@ class Lightmap(Planes):
     stats : vdbshade.types.BakeStats
         counts of texels and of work
     errors : dict
-        root mean square error that is estimated of "shadow.NAME", "ao" and "sky"; NaN where a method knows none
+        estimated root mean square error of "shadow.NAME", "ao" and "sky"; NaN where a method knows none
     field_errors : dict
-        the part of it by voxels
+        the part of it that voxels make
     """
 
     stats: types.BakeStats
@@ -447,7 +447,7 @@ def bake_lightmap(occluders: Occluders, charts: Charts, lights: Union[Light, Seq
     Parameters
     ----------
     lights : Light or sequence of Light
-        no two of one name
+        no two with the same name
     ao : bool
         AO within ``ao_distance``, world units
     irradiance : bool
@@ -531,15 +531,15 @@ def lightmaps_stitch(pages: Sequence[Tuple[Charts, Mapping[str, Floats]]], *, ru
 
 def lightmap_fill_hidden(charts: Charts, lightmap: Mapping[str, Floats], *, bent: Optional[types.BentSpace] = None,
                          run: Optional[Run] = None) -> int:
-    """Gives texels that are not valid and that no valid one of their chart filled, as those of faces that touch each other, the
-    values of the texel that is nearest in the world, and pads around them. The lightmap's arrays are written into.
+    """Fills invalid texels of charts that have no valid texel near, such as those of faces that touch each other. They get the value
+    of the texel that is nearest in the world, and padding. Writes into the lightmap's arrays.
 
     Parameters
     ----------
     charts : Charts
-        that the lightmap was baked of
+        charts that the lightmap was baked for
     bent : str, optional
-        the space of a plane "bent"; None: it is left, as one in "tangent" space is
+        the space of a plane "bent"; None or "tangent": it is left as it is
 
     Returns
     -------
@@ -560,7 +560,7 @@ class Voxels(Handle, kind="vsh_voxels"):
 
     @classmethod
     def from_grid(cls, grid: Grid, band: float = 0.0, *, run: Optional[Run] = None) -> "Voxels":
-        """A level set's own narrow band, `band` voxels to both sides; 0: all of it."""
+        """The voxels of a level set up to `band` voxels on both sides of its surface; 0: its whole narrow band."""
         return cls._of(call(lib.vsh_voxels_from_grid, grid, band, OUT, run=run))
 
     @classmethod
@@ -586,7 +586,7 @@ class Volume(Handle, kind="vsh_volume"):
 
     def _number(self, grid: Union[int, str]) -> int:
         if isinstance(grid, int):
-            return grid if grid >= 0 else 2**32  # which is none
+            return grid if grid >= 0 else 2**32  # no such grid
         names = [g.name for g in self.grids]
         if grid not in names:
             raise KeyError(f"no grid {grid!r}; there are {', '.join(names)}")
@@ -624,7 +624,7 @@ def bake_volume(occluders: Occluders, voxels: Voxels, lights: Union[Light, Seque
 
 
 class Camera(Struct, kind="vsh_camera"):
-    """A pinhole.
+    """A pinhole camera.
 
     Parameters
     ----------
@@ -645,7 +645,7 @@ class Camera(Struct, kind="vsh_camera"):
         return self
 
     def frame_points(self, points: ArrayLike, azimuth: float = 0.5, elevation: float = 0.5, aspect: float = 16 / 9) -> "Camera":
-        """The same for points (n, 3), as near as they can all be seen."""
+        """Moves it as near to points (n, 3) as it can while it sees all of them."""
         at = array(points, numpy.float64, (None, 3), "points")
         call(lib.vsh_camera_frame_points, self, len(at), at, azimuth, elevation, aspect)
         return self
@@ -666,7 +666,7 @@ class LitMeshes(Struct, kind="vsh_lit_meshes"):
         planes of a bake on them; None: each point is shaded
     color : three floats
     ambient : bool
-        its irradiance has the sky's light in it
+        its irradiance includes the sky's light
     """
 
     def __init__(self, meshes: Meshes, lightmap: Optional[Mapping[str, ArrayLike]] = None, color: Sequence[float] = (0.7, 0.7, 0.7),
