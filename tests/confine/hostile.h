@@ -1,19 +1,19 @@
-/* What hostile code in a reader tries; tests only, and harmless where it succeeds: it touches marker files of
- * the test's folder, and sends SIGUSR1 to a process of the test's own. */
+/* Attacks by hostile code in a reader, for tests only. They are harmless if they succeed: they touch marker
+ * files in the test's folder, and send SIGUSR1 to a process of the test. */
 #pragma once
 
 #include <stddef.h>
 
-/* Of the environment (VSH_TEST_…): whom it acts on. */
+/* The targets of the attacks, from the environment (VSH_TEST_…). */
 typedef struct hostile_aim {
-    const char *folder; /* for marker files; `kept` is a file there that is to stay as it is */
-    int victim;         /* a process that is to get no signal */
+    const char *folder; /* for marker files; the file `kept` in it must not change */
+    int victim;         /* a process that must get no signal */
     int parent;
     const char *outside; /* a file beyond what the reader needs; may be NULL */
 } hostile_aim;
 
-/* Tries each call in the calling thread. The names of those that were let through go to `done`, a blank
- * before each. Returns how many were tried. */
+/* Tries each call in the calling thread. Writes the names of successful ones to `done`, with a blank before
+ * each. Returns how many it tried. */
 int hostile_calls(const hostile_aim *aim, char *done, size_t room);
 
 /* Tries to read the parent, its memory and environment, and other files than the reader needs. As

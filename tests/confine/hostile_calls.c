@@ -1,4 +1,4 @@
-/* Each call as the kernel has it, past the C library. */
+/* Makes each system call directly, without the C library. */
 #define _GNU_SOURCE
 #include "hostile.h"
 
@@ -31,7 +31,8 @@ typedef struct trial {
     char marker[PATH_ROOM], kept[PATH_ROOM];
 } trial;
 
-/* A call that the kernel looked into, and only then refused, was let through, too. */
+/* Notes a call that was let through. A call that the kernel refuses for another reason was let through,
+ * too. */
 static void note(trial *t, const char *name, long result) {
     ++t->count;
     if (result >= 0 || (errno != EPERM && errno != ENOSYS)) {
@@ -64,7 +65,7 @@ static void write_files(trial *t) {
     note(t, "memfd_create", syscall(SYS_memfd_create, "x", 0U));
 }
 
-/* A child that came about leaves a marker, and ends. */
+/* If a call made a child, the child leaves a marker, and ends. */
 static void end_child(const trial *t, long result) {
     if (result == 0) {
         syscall(SYS_openat, AT_FDCWD, t->marker, O_WRONLY | O_CREAT, 0666);
@@ -169,7 +170,7 @@ static void note_read(trial *t, const char *name, long result) {
 static void read_file(trial *t, const char *name, const char *path) {
     char bytes[64];
     const int file = (int)syscall(SYS_openat, AT_FDCWD, path, O_RDONLY);
-    note_read(t, name, file); /* to be let in is enough */
+    note_read(t, name, file); /* opening it is enough */
     if (file >= 0) {
         note_read(t, name, read(file, bytes, sizeof bytes) > 0 ? 0 : -1);
         close(file);

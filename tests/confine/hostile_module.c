@@ -1,7 +1,7 @@
-/* Preloaded (LD_PRELOAD) into a reader it takes over what parses the file, as a parser that a file has taken
- * over would: with the first write of the answer, when the reader is confined. VSH_TEST_HOSTILE says how.
- * What was let through is told in the answer's message, which the command line prints. Does nothing in
- * another process. */
+/* Preloaded (LD_PRELOAD) into a reader, this attacks like a parser that a file has taken over. It starts with
+ * the first write of the answer, when the reader is confined. VSH_TEST_HOSTILE says how. The answer's
+ * message, which the command line prints, lists the attacks that were let through. Does nothing in another
+ * process. */
 #define _GNU_SOURCE
 #include "hostile.h"
 
@@ -29,7 +29,7 @@ static hostile_aim aim;
 static const char *how; /* NULL: leave this process alone */
 static hostile_fn *attack = hostile_calls;
 
-/* What threads tell. */
+/* Results of the threads. */
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static char told[ROOM];
 static int tried;
@@ -54,7 +54,7 @@ static void sleep_until(int *value) {
     }
 }
 
-/* --- threads that are there before main, as those of liblog4cplus are */
+/* --- threads that begin before main, like those of liblog4cplus */
 
 static void *wait_and_attack(void *unused) {
     __atomic_add_fetch(&waiting, 1, __ATOMIC_SEQ_CST);
@@ -74,7 +74,7 @@ __attribute__((noreturn)) void rewritten(void) {
     }
 }
 
-/* Aligns the stack, which a return leaves otherwise than a call does. */
+/* Aligns the stack: it is not aligned after a return, as it is after a call. */
 __asm__(".text\nrewritten_start:\nand $-16, %rsp\ncall rewritten@PLT\n");
 extern char rewritten_start[];
 

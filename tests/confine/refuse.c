@@ -1,4 +1,4 @@
-/* A kernel that has not what confines a reader: runs a command where the calls that are named fail.
+/* Imitates a kernel that lacks a part of the confinement: runs a command for which the named calls fail.
  * Usage: refuse [seccomp] [landlock] [limits] -- COMMAND … */
 #include <errno.h>
 #include <seccomp.h>

@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Whether this program is the reader of its files itself, as one of the static library is. */
+/* Whether this program is its own reader, as programs with the static library are. */
 #ifndef OWN_READER
 #define OWN_READER 0
 #endif
@@ -30,7 +30,7 @@ static void check(const char *what, vsh_result result) {
     }
 }
 
-/* A ball of radius 0.5, its middle 1 above the origin. */
+/* The distance to a ball of radius 0.5, centred 1 above the origin. */
 static double ball(void *user, const double position[3]) {
     const double *height = user;
     const double x = position[0], y = position[1] - *height, z = position[2];
@@ -48,7 +48,7 @@ static vsh_grid *write_and_read(const char *folder) {
     check("callback", vsh_grid_from_distance(&sphere, &options, NULL, &made, &error));
     check("write", vsh_grid_write(made, path, "ball", NULL, 0, &error));
     vsh_grid_free(made);
-    /* by the reader that is installed with the library */
+    /* uses the reader that is installed with the library */
     vsh_run run = vsh_run_default();
     run.reader = OWN_READER ? "/proc/self/exe" : VSH_READER;
     uint32_t confined = 0;
@@ -64,7 +64,7 @@ static vsh_grid *write_and_read(const char *folder) {
     return grid;
 }
 
-/* Under the ball, and far aside. AO under a sphere is 1 - (r / d)² = 0.75. */
+/* Shades a point under the ball and one far from it. AO under a sphere is 1 - (r / d)² = 0.75. */
 static void ask_points(vsh_grid *grid) {
     static const double positions[] = {0.0, 0.0, 0.0, 5.0, 0.0, 0.0};
     static const float normals[] = {0.0F, 1.0F, 0.0F, 0.0F, 1.0F, 0.0F};
@@ -76,7 +76,7 @@ static void ask_points(vsh_grid *grid) {
     vsh_occluders *occluders = NULL;
     float visible[2] = {-1.0F, -1.0F}, open[2] = {-1.0F, -1.0F};
     check("occluders", vsh_occluders_from_grid(grid, NULL, NULL, &occluders, &error));
-    vsh_grid_free(grid); /* they do not need it */
+    vsh_grid_free(grid); /* occluders do not need it */
     check("shadow",
           vsh_shade_shadow(occluders, &points, &light, &options, NULL, visible, NULL, NULL, &error));
     check("ao", vsh_shade_ao(occluders, &points, &options, NULL, open, NULL, NULL, NULL, &error));
@@ -87,7 +87,8 @@ static void ask_points(vsh_grid *grid) {
     expect("AO far aside", open[1], 0.99, 1.0);
 }
 
-/* By the module of image formats, which is installed beside the library; EXR needs none. */
+/* Writes a picture by the module of image formats, which is installed beside the library. EXR needs no
+ * module. */
 static void write_picture(const char *folder) {
     enum { SIZE = 32 };
     char path[4096];

@@ -1,4 +1,4 @@
-/* A C++ program with OpenVDB grids of its own: there and back without a file. */
+/* A C++ program that exchanges OpenVDB grids with the library, without a file. */
 #include <cmath>
 #include <cstdio>
 #include <cstring>

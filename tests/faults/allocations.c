@@ -86,7 +86,7 @@ static void *note(void *block) {
     return block;
 }
 
-/* Blocks that a library made for us to free are not known here. */
+/* Forgets a block. Blocks that a library allocated and we free are not in the table. */
 static void forget(const void *block) {
     if (block != NULL) {
         pthread_mutex_lock(&lock);

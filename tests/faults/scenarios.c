@@ -8,14 +8,14 @@ static void free_list(double **list) {
 
 /* --- parts of several scenarios */
 
-/* Values 0 … 1, no two neighbours alike. */
+/* Fills an array with values of 0 … 1; no two neighbours are equal. */
 static void parts_fill(float *values, size_t count) {
     for (size_t i = 0; i < count; ++i) {
         values[i] = (float)(i * 37 % 101) / 100.0f;
     }
 }
 
-/* A cube of 1. */
+/* A cube with edges of 1. */
 static vsh_mesh cube(void) {
     static float corners[24];
     return box_mesh(corners, (const double[3]){0, 0, 0}, (const double[3]){1, 1, 1});
@@ -197,7 +197,8 @@ static vsh_result make_casters(const vsh_run *run, vsh_error *error) {
     return VSH_OK;
 }
 
-/* Meshes of two triangles, whose vertices are split and on two pages; NULL: by their own UVs. */
+/* Writes a lit asset of meshes of two triangles. With `split_them`, vertices are split and lie on two pages;
+ * else the meshes keep their UVs. */
 static vsh_result light_asset(const char *name, bool split_them, const vsh_run *run, vsh_error *error) {
     enum { CORNERS = 6 };
     static const float white[] = {1.0f, 0.5f, 0.25f, 2.0f};

@@ -3,8 +3,8 @@
 
 #include "../unit/testing.h"
 
-/* Runs to its end or to the first failure, whose code and error it returns, and frees what it made. Calls
- * that fail must leave NULL for their handles, else it aborts. */
+/* Runs to the end or to the first failure, returns that call's code and error, and frees everything that it
+ * made. Aborts if a call that fails does not leave NULL for its handle. */
 typedef vsh_result scenario_fn(const vsh_run *run, vsh_error *error);
 
 typedef struct scenario {
@@ -15,18 +15,18 @@ typedef struct scenario {
 extern const scenario scenarios[];
 extern const size_t scenario_count;
 
-/* Makes a folder with the files that scenarios read and write, outputs holding "old", and enters it; takes it
- * away again. cmocka's way of setting up a group. */
+/* Makes and enters a folder with the files that scenarios read, and outputs that contain "old"; the second
+ * removes it. Setup and teardown of a cmocka group. */
 int scenarios_begin(void **state);
 int scenarios_end(void **state);
 
-/* Whether the outputs of a scenario that failed are as they were, and no other file is there; then they are
- * made so anew. */
+/* Whether the outputs are unchanged after a scenario that failed, and there are no new files. Restores both
+ * in any case. */
 int scenarios_untouched(void);
 
 /* --- Parts of scenarios. */
 
-/* Runs a call; ends the scenario where it fails, and the test where it then left a handle. */
+/* Runs a call. Ends the scenario if it fails, and the test if it then left a handle. */
 #define TRY(call)                                                                                            \
     do {                                                                                                     \
         const vsh_result tried = (call);                                                                     \
@@ -52,30 +52,31 @@ enum { SIDE = 12, POINTS = 80, IMAGES = 3 };
 extern const char *const images[IMAGES];
 
 /* --- Allocations that fail: the linker's --wrap sends every malloc, calloc, realloc, aligned_alloc,
- * posix_memalign, strdup, strndup and free of our objects here, where the n-th may fail and what is not freed
- * is counted. Allocations of the libraries underneath are not seen. */
+ * posix_memalign, strdup, strndup and free of our objects here, where the n-th may fail, and blocks that are
+ * not freed are counted. Allocations of other libraries are not seen. */
 
 /* From now on the `first`-th allocation fails (from 1; 0: none) and, where `all` is not 0, every later one.
  * Begins counting anew. */
 void faults_begin(uint64_t first, int all);
 
-/* Ends it; the number of allocations since, and in *failed how many of them were refused. */
+/* Ends it. Returns the number of allocations since then; *failed is how many of them failed. */
 uint64_t faults_end(uint64_t *failed);
 
 /* Blocks that were taken since the process began, and are not freed. */
 uint64_t faults_live(void);
 
 /* --- System calls of writing that fail: the linker's --wrap sends open, pwrite, fsync, close and rename of
- * our objects here. Counted are those of files that are being written. */
+ * our objects here. Only calls on files that are being written count. */
 
 enum {
     WRITES_FAIL,  /* the n-th fails, as on a full disk */
-    WRITES_SHORT, /* every pwrite writes but a part, every other is interrupted first: all must go well */
+    WRITES_SHORT, /* every pwrite writes only a part, every second one is interrupted first: all must succeed
+                   */
     WRITES_KILL   /* SIGKILL in place of the n-th */
 };
 
-/* From now on; n from 1, 0: none. */
+/* Starts counting, and lets the n-th call (from 1; 0: none) fail. */
 void writes_begin(uint64_t n, int how);
 
-/* The number of calls since; *what names the one that failed, NULL: none did. */
+/* Ends it. Returns the number of calls since then; *what names the one that failed, NULL if none did. */
 uint64_t writes_end(const char **what);

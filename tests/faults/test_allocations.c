@@ -1,5 +1,5 @@
 /* Every allocation of our C code fails in turn, alone or with all that follow it: each time the call says so,
- * leaks nothing, leaves outputs as they were, and works when it is asked again. */
+ * leaks nothing, leaves outputs unchanged, and works when it is called again. */
 #include "scenarios.h"
 
 #include <inttypes.h>
@@ -49,10 +49,10 @@ TEST(every_allocation_may_fail) {
     for (size_t i = 0; i < scenario_count; ++i) {
         const scenario *s = &scenarios[i];
         vsh_error error = {0};
-        for (int pass = 0; pass < 2; ++pass) { /* libraries set things up once */
+        for (int pass = 0; pass < 2; ++pass) { /* twice, because libraries set things up once */
             assert_that(s->run(&run, &error) == VSH_OK, "%s: %s", s->name, error.message);
         }
-        scenarios_untouched(); /* no: it has written */
+        scenarios_untouched(); /* restores the outputs that it has written */
         const uint64_t alone = fail_each(s, 0, 1);
         scenarios_untouched();
         const uint64_t all = fail_each(s, 1, STEP);

@@ -1,6 +1,6 @@
 /* Every system call of writing fails in turn, or the process is killed in its place: the old file is intact,
- * no temporary stays (after a kill: none after the next run), and the error says why. All work is done in
- * children, as a process that has begun threads cannot be forked. */
+ * no temporary stays (after a kill: none after the next run), and the error says why. Children do all work,
+ * because a process that has started threads cannot be forked. */
 #include "base/file.h"
 #include "scenarios.h"
 
@@ -62,7 +62,7 @@ static int run_well(const scenario *s, uint64_t n) {
     return s->run(&run, NULL) == VSH_OK ? FINE : BAD;
 }
 
-/* --- here */
+/* --- in the test's process */
 
 /* The child's exit status; -1: it was killed. */
 static int in_child(int (*work)(const scenario *, uint64_t), const scenario *s, uint64_t n) {
@@ -101,7 +101,7 @@ TEST(every_write_may_fail) {
             status = in_child(run_failing, s, n);
         }
         assert_int_equal(status, NOTHING_FAILED);
-        scenarios_untouched(); /* no: the last one has written */
+        scenarios_untouched(); /* restores the outputs that the last one has written */
         if (writes(s)) {
             assert_true(
                 n > 4); /* one to open, flush and rename at least: what a module writes is not seen here */
@@ -140,7 +140,7 @@ TEST(a_kill_at_every_write_leaves_the_old_file_and_the_next_run_tidies_up) {
             }
             scenarios_untouched();
         }
-        assert_int_equal(left > 0, writes(s)); /* kills did hit */
+        assert_int_equal(left > 0, writes(s)); /* kills have left temporaries */
         scenarios_untouched();
     }
 }

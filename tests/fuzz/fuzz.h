@@ -1,6 +1,6 @@
 /* Helpers of fuzz targets. A target is one function, LLVMFuzzerTestOneInput(), that gets any bytes and must
- * return. A crash, a sanitizer's report or an abort() is a find. Targets run under libFuzzer (tools/fuzz) or
- * replay files. */
+ * return. A crash, a sanitizer's report or an abort() is a finding. Targets run under libFuzzer (tools/fuzz)
+ * or replay files. */
 #pragma once
 
 #include <vdbshade/vdbshade.h>
@@ -20,7 +20,7 @@
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
-/* Bytes on their way into parameters; zeros behind their end. */
+/* Bytes from which parameters are made; zeros follow the last one. */
 typedef struct fuzz_input {
     const uint8_t *at;
     size_t left;
@@ -30,39 +30,39 @@ void fuzz_fill(fuzz_input *input, void *to, size_t size);
 uint8_t fuzz_byte(fuzz_input *input);
 
 /* A folder of this process in memory (/dev/shm), or else in TMPDIR; removed with its files at exit. Its path
- * holds until then. */
+ * is valid until then. */
 const char *fuzz_folder(void);
 
-/* Writes a file there; the path, which holds until the next call. */
+/* Writes a file there. Returns its path, which is valid until the next call. */
 const char *fuzz_file(const char *name, const void *data, size_t size);
 
 enum { FUZZ_MEMORY = 64 << 20 };
 
-/* One thread, that much memory, warnings looked at, and a progress callback that cancels after 30 ms: inputs
- * that ask for much are not to stop the fuzzer. */
+/* A run with one thread, limited memory, warnings that are checked, and a progress callback that cancels
+ * after 30 ms, so that large inputs do not stop the fuzzer. */
 vsh_run fuzz_run(void);
 
 /* True once that time is over; fuzz_run() starts it. */
 int fuzz_is_late(void);
 
-/* The error of the next call, filled with what no call leaves in it. */
+/* The error for the next call, filled with values that no call leaves in it. */
 vsh_error *fuzz_error(void);
 
-/* Aborts where a call's result, its error and its handle do not fit together; else returns the result.
- * `place` is where the handle is. */
+/* Aborts if a call's result, its error and its handle at `place` contradict each other; else returns the
+ * result. */
 vsh_result fuzz_check(vsh_result result, const void *place);
 
-/* The same for a call without a handle. */
+/* Checks a call without a handle in the same way. */
 vsh_result fuzz_check_plain(vsh_result result);
 
-/* Aborts where a condition does not hold. */
+/* Aborts if a condition does not hold. */
 void fuzz_require(int holds, const char *condition);
 #define FUZZ_REQUIRE(condition) fuzz_require((condition), #condition)
 
 /* Makes a handle by a call that is given fuzz_error(), and checks all three. */
 #define FUZZ_MAKE(handle, call) fuzz_check((call), &(handle))
 
-/* Makes one by such a call, and frees it. */
+/* Makes a handle in the same way, and frees it. */
 #define FUZZ_TRY(type, name, call)                                                                           \
     do {                                                                                                     \
         type *name;                                                                                          \

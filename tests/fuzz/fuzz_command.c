@@ -1,8 +1,8 @@
-/* The command line: words made of the input, run in a folder of small files. Options come from the commands'
- * own tables, so that new ones take part; values are likely ones or the input's own text, in which '/' is not
- * left, as nothing is to be written elsewhere. Children are refused (the fuzzer has threads by then), so that
- * what is read in one first ends there. The run is interrupted when its time is over, and the machine has 64
- * MiB. */
+/* The command line: words made from the input, run in a folder of small files. Options come from the
+ * commands' own tables, so new ones are included. Values are likely ones or text from the input, without '/',
+ * because nothing may be written outside of the folder. fork() fails, because the fuzzer has threads by then,
+ * so commands that would parse a file in a child end there. The run is interrupted when its time is over, and
+ * the machine seems to have 64 MiB. */
 #include "fuzz.h"
 
 #include "cli/cli.h"
@@ -62,7 +62,7 @@ static const struct {
     {"points.csv", "x,y,z,nx,ny,nz\n0,1,0,0,1,0\n1,1,1,0,1,0\nnan,0,0,0,1,0\n"},
 };
 
-/* The files as they were, and no others. */
+/* Restores the files, and removes all others. */
 static void clean(void) {
     DIR *listing = opendir(".");
     FUZZ_REQUIRE(listing != NULL && chdir(fuzz_folder()) == 0);
@@ -75,7 +75,7 @@ static void clean(void) {
     }
 }
 
-/* Text of the input's own: up to the next NUL. */
+/* Takes text from the input, up to the next NUL. */
 static void take_text(fuzz_input *input, char text[MOST_TEXT]) {
     size_t used = 0;
     while (input->left > 0 && used + 1 < MOST_TEXT) {

@@ -1,5 +1,5 @@
-/* EXR and PNG files, which our own readers hand to OpenEXR's C core and to libpng, and what is made of their
- * pixels: a heightfield of either kind, and the outline of a mask. */
+/* EXR and PNG files, which our own readers pass to OpenEXR's C core and to libpng. From their pixels it makes
+ * heightfields of both kinds and the outline of a mask. */
 #include "fuzz.h"
 
 #include <vdbshade/image.h>
@@ -21,7 +21,7 @@ static void use(const vsh_image *image, const char *path) {
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (size < 4 || (data[0] != 0x89 && data[0] != 0x76)) {
-        return -1; /* not of the corpus: these go to OpenImageIO, see fuzz_picture */
+        return -1; /* do not add it to the corpus: OpenImageIO reads such files (fuzz_picture) */
     }
     const char *path = fuzz_file("a.png", data, size);
     vsh_image_file *file;

@@ -1,6 +1,5 @@
-/* Pixels of masks and heightfields, whatever their numbers: the input is width, threshold and the pixels'
- * bits. The image is written and read by the public calls; the outline that is made of it is one of an area.
- */
+/* Masks and heightfields with any pixels: the input is width, threshold and the pixels' bits. Public calls
+ * write and read the image. An outline made from it must bound an area. */
 #include "fuzz.h"
 
 #include <vdbshade/grid.h>
@@ -19,7 +18,7 @@ static void check_outline(const vsh_outline *outline) {
     FUZZ_REQUIRE(isfinite(vshi_outline_square(outline, inside, INFINITY)));
     for (size_t i = 0; i < outline->contour_count; ++i) {
         FUZZ_REQUIRE(outline->starts[i + 1] >=
-                     outline->starts[i] + 4); /* the first point stands at both ends */
+                     outline->starts[i] + 4); /* each contour repeats its first point at its end */
     }
 }
 

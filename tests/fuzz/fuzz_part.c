@@ -17,7 +17,8 @@ static const char floor_text[] = "v -2 0 -2\nv 2 0 -2\nv 2 0 2\nv -2 0 2\nvt 0 1
                                  "f 1/1 3/3 2/2\nf 1/1 4/4 3/3\n";
 static const char wall_text[] = "v -2 -1 0\nv 1 -1 0\nv 1 1 0.5\nv -2 1 0.5\nf 1 2 3\nf 1 3 4\n";
 
-/* Light that is made of AO by cones; and AO that parts leave, with all that is made of it. */
+/* Two scenes: light with AO by cones; and AO whose shots are in the parts, with all planes that depend on
+ * it. */
 static const char *const scenes[] = {
     "{\"casters\":[{\"sdf\":{\"shape\":\"sphere\",\"radius\":0.7}}],\"resolution\":16,\"irradiance\":true,"
     "\"method\":\"cone\","
@@ -83,7 +84,7 @@ static void make_sources(void) {
     }
 }
 
-/* --- a part of the input's */
+/* --- a part made from the input */
 
 typedef struct part {
     unsigned char *at;
@@ -148,7 +149,7 @@ static part make_part(fuzz_input *input, const source *s, int shard) {
     return p;
 }
 
-/* --- what takes it */
+/* --- the calls under test */
 
 static vsh_result count_rows(void *user, const vsh_scene_lightmap *lightmap, const vsh_image *image,
                              int32_t first, int32_t count, const float *const *planes, vsh_error *error) {

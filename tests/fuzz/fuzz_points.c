@@ -1,6 +1,6 @@
 /* Point files of every format: read in small batches, kept or not, and written with answers beside them, as
- * the query command does. The first byte chooses formats and how. A file that is written in full must be read
- * again without another bad row. */
+ * the query command does. The first byte chooses the formats and options. A file that is written in full must
+ * be read again without another bad row. */
 #include "fuzz.h"
 
 #include "cli/query/points.h"
@@ -29,7 +29,7 @@ static int copy(cli_points_reader *reader, int32_t format, bool answers_only, co
 }
 
 static void read_back(const char *path, int32_t format, const cli_points_reader *written) {
-    fuzz_run(); /* the time begins anew */
+    fuzz_run(); /* starts the time again */
     cli_points_reader reader;
     int code = cli_points_open(path, format, -1, false, &reader);
     cli_points points = cli_points_create(ROWS, reader.has_normals, false);
@@ -53,7 +53,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (size == 0) {
         return 0;
     }
-    fuzz_run(); /* the time begins */
+    fuzz_run(); /* starts the time */
     const int32_t from = data[0] % 3, to = data[0] / 3 % 3;
     const int normals = data[0] / 9 % 3 - 1;
     const bool strict = data[0] / 27 % 2 != 0, answers_only = data[0] / 54 % 2 != 0;

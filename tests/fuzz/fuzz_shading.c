@@ -53,7 +53,7 @@ static void query(fuzz_input *input) {
         fuzz_free_occluders(occluders);
         return;
     }
-    /* strides as long as they can be wished, within these */
+    /* strides as the input asks, within these limits */
     enum { ROOM = 1 << 12, MOST_STRIDE = 256 };
     static double positions[ROOM];
     static float normals[ROOM], visibility[ROOM], ao[ROOM], distance[ROOM], gradient[ROOM];

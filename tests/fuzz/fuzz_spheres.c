@@ -1,4 +1,4 @@
-/* Files of spheres, and what is made of them. */
+/* Files of spheres, and casters made from them. */
 #include "fuzz.h"
 
 #include "shapes/spheres.h"

@@ -75,7 +75,7 @@ vsh_run fuzz_take_run(fuzz_input *input) {
         wild.user = NULL;
         wild.reader = NULL; /* a program */
         wild.threads =
-            wild.threads > 2 && wild.threads <= 1024 ? 2 : wild.threads; /* they take memory and time */
+            wild.threads > 2 && wild.threads <= 1024 ? 2 : wild.threads; /* more take memory and time */
         wild.memory_limit = wild.memory_limit == 0 || wild.memory_limit > run.memory_limit
                                 ? run.memory_limit
                                 : wild.memory_limit;

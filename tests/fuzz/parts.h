@@ -14,7 +14,7 @@ typedef struct fuzz_handles {
     vsh_mesh mesh;
     vsh_grid *grid;
     vsh_field *field;
-    vsh_occluders *occluders; /* of the field alone */
+    vsh_occluders *occluders; /* made from the field alone */
     vsh_outline *outline;
     vsh_voxels *voxels;
     vshi_heights *heights;
@@ -29,10 +29,10 @@ extern const uint32_t fuzz_indices[36];
 /* A call that must not fail. */
 #define FUZZ_MUST(call) FUZZ_REQUIRE((call) == VSH_OK)
 
-/* A struct of options: as it is with some bytes changed, or all bytes the input's. */
+/* Fills a struct of options: changes some bytes, or takes all bytes from the input. */
 void fuzz_take(fuzz_input *input, void *to, size_t size);
 vsh_run fuzz_take_run(fuzz_input *input);
-/* Occluders, with a layer or without. The input may make none: then they are those of fuzz_made(). Free them
+/* Occluders, with a layer or without. If the input makes none, these are the ones of fuzz_made(). Free them
  * with fuzz_free_occluders(). */
 vsh_occluders *fuzz_take_occluders(fuzz_input *input);
 void fuzz_free_occluders(vsh_occluders *occluders);

@@ -15,12 +15,12 @@ static int replay_file(const char *path) {
         return 0;
     }
     const size_t size = (size_t)status.st_size;
-    /* of the very size, so that a sanitizer sees what is read past it */
+    /* of exactly this size, so that a sanitizer sees reads past the end */
     uint8_t *bytes = size > 0 ? malloc(size) : NULL;
     const int whole = (bytes != NULL || size == 0) && fread(bytes, 1, size, file) == size;
     fclose(file);
     if (whole) {
-        fprintf(stderr, "%s\n", path); /* standard output is the target's */
+        fprintf(stderr, "%s\n", path); /* standard output belongs to the target */
         LLVMFuzzerTestOneInput(bytes, size);
     }
     free(bytes);
@@ -53,5 +53,5 @@ int main(int argc, char **argv) {
                                                                        : replay_file(argv[i]);
     }
     fprintf(stderr, "%d inputs\n", done);
-    return done > 0 ? EXIT_SUCCESS : EXIT_FAILURE; /* a corpus that is gone is a failure */
+    return done > 0 ? EXIT_SUCCESS : EXIT_FAILURE; /* a missing corpus is a failure */
 }

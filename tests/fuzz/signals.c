@@ -1,5 +1,5 @@
-/* Signals of the command line, for targets: an interrupt comes when the time of an input is over, and no
- * thread waits for one. */
+/* Signals of the command line, for targets: an input's run is interrupted when its time is over, and no
+ * thread waits for signals. */
 #include "cli/cli.h"
 
 #include "fuzz.h"

@@ -1,7 +1,7 @@
-/* Preloaded by tests/cli/refusals.bats: system calls that are refused, or told of.
- * REFUSE_THREADS=N: no more than N threads at a time, LINGER=MS: one that was joined counts for so long yet;
- * REFUSE_MEMFD: none; VSH_TEST_MALLOC=N: the N-th allocation of the program VSH_TEST_PROGRAM;
- * TELL_SYNCS=FILE: a line for each fsync(), fdatasync() and rename(), with the names. */
+/* Preloaded by tests/cli/refusals.bats: refuses system calls, or lists them. REFUSE_THREADS=N: no more than N
+ * threads at a time, LINGER=MS: a thread counts for so long after it was joined; REFUSE_MEMFD: none;
+ * VSH_TEST_MALLOC=N: the N-th allocation of the program VSH_TEST_PROGRAM; TELL_SYNCS=FILE: a line for each
+ * fsync(), fdatasync() and rename(), with the names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
@@ -24,7 +24,7 @@ static void *next(const char *name) {
 
 static atomic_int living;
 
-/* A thread, and what it was to do; one that ended long ago stays in the list. */
+/* A thread and its function. It stays in the list after it has ended. */
 typedef struct call {
     void *(*fn)(void *);
     void *user, *result;
@@ -71,7 +71,7 @@ int pthread_create(pthread_t *thread, const pthread_attr_t *attributes, void *(*
     return result;
 }
 
-/* As the system's, which may come back before the thread is out of its counts. */
+/* Like the system's own, this may return while the thread still counts. */
 int pthread_join(pthread_t thread, void **result) {
     int (*real)(pthread_t, void **);
     void *found = next("pthread_join");
@@ -103,7 +103,7 @@ int memfd_create(const char *name, unsigned flags) {
     return real(name, flags);
 }
 
-/* glibc's own: dlsym() would allocate. */
+/* glibc's own functions, because dlsym() would allocate. */
 void *__libc_malloc(size_t size);
 void *__libc_calloc(size_t count, size_t size);
 void *__libc_realloc(void *old, size_t size);

@@ -177,7 +177,7 @@ static int cubic_roots(double a, double b, double c, double roots[3]) {
  * enters where f's least value is negative, and that lies at an end or where the cubic f' is 0: an error in t
  * there hardly moves f, so grazing rays need no care. */
 static bool hit_torus(const double q[3], const double d[3], double ring, double tube, double limit) {
-    const double middle = -dot(q, d); /* t is counted from the point nearest the centre: small coefficients */
+    const double middle = -dot(q, d); /* t is 0 nearest to the centre: small coefficients */
     double o[3];
     for (int i = 0; i < 3; i++) {
         o[i] = q[i] + middle * d[i];

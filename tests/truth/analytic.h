@@ -1,5 +1,5 @@
-/* Analytic truth: solids in closed form, and what rays against them say about lights and ambient occlusion.
- * Shares no code with the library, so that neither can hide the other's mistakes. */
+/* Analytic truth: solids in closed form, and the light and ambient occlusion that rays against them find.
+ * Shares no code with the library, so that no mistake is in both. */
 #pragma once
 
 #include <stdbool.h>
@@ -42,12 +42,12 @@ bool truth_hit(truth_scene scene, const double origin[3], const double direction
 
 /* Fraction of a light that the point sees: `rays` directions whose points are uniform in area over the disc
  * of radius w, a unit away along `towards`. Rays end at `limit` (INFINITY for a directional light). Rays not
- * above the plane of `normal` count as hidden; NULL: no horizon. NAN where memory is short. */
+ * above the plane of `normal` count as hidden; NULL: no horizon. NAN if memory is short. */
 double truth_light(truth_scene scene, const double point[3], const double *normal, const double towards[3],
                    double w, double limit, size_t rays);
 
-/* The same at `count` points [count][3] that share a normal: the directions are made once. Returns 0, or -1
- * where memory is short. */
+/* Does the same at `count` points [count][3] that share a normal, for which it makes the directions once.
+ * Returns 0, or -1 if memory is short. */
 int truth_lights(truth_scene scene, size_t count, const double *points, const double *normal,
                  const double towards[3], double w, double limit, size_t rays, float *visible);
 

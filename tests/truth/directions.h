@@ -9,7 +9,7 @@ typedef struct truth_frame {
 } truth_frame;
 truth_frame truth_frame_around(const double direction[3]);
 
-/* A direction given in a frame's axes, in the world. */
+/* Turns a direction from the frame's axes to the world. */
 void truth_to_world(const truth_frame *frame, const double local[3], double direction[3]);
 
 /* Unit direction `index` of `count` towards a disc of radius w, a unit away along the frame's axis. */
@@ -20,5 +20,6 @@ void truth_light_direction(const truth_frame *frame, double w, size_t index, siz
  * the disc's points raised to the sphere). */
 void truth_cosine_direction(const truth_frame *frame, size_t index, size_t count, double direction[3]);
 
-/* Visible share of a disc that a straight edge covers, the edge at x (-1 … 1, in radii) from its centre. */
+/* Visible share of a disc that a straight edge covers. The edge is at x from the disc's centre, radii, -1 …
+ * 1. */
 double truth_disc_share(double x);

@@ -64,7 +64,7 @@ static bool attach(truth_mesh *truth, const vsh_mesh *mesh) {
             vertices[3 * v + (size_t)i] = (float)(world[i] - truth->center[i]);
         }
     }
-    /* A mirroring transform turns triangles inside out; their winding is turned back. */
+    /* A mirroring transform turns triangles inside out, so their corners are exchanged. */
     const bool flip = mirrors(mesh->transform);
     for (size_t t = 0; t < mesh->triangle_count; t++) {
         const uint32_t *from = &mesh->indices[3 * t];

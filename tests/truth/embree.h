@@ -7,16 +7,16 @@
 /* The triangles of all meshes in world space. Immutable; may be shared by threads. */
 typedef struct truth_mesh truth_mesh;
 
-/* Copies the meshes, with their transforms applied in double; both sides of a triangle block. NULL where
- * Embree refuses. Free it with truth_mesh_free(). */
+/* Copies the meshes, with their transforms applied in double; both sides of a triangle block. NULL if Embree
+ * fails. Free it with truth_mesh_free(). */
 truth_mesh *truth_mesh_create(const vsh_mesh *meshes, size_t mesh_count);
 void truth_mesh_free(truth_mesh *truth);
 
 /* Fraction of a light that each of `count` origins [count][3] sees, by `rays` rays each. As for
- * truth_light(), the light is a disc of radius w, a unit away along `towards`. Rays begin at the very
- * origins: the caller has lifted them. Rays below the plane of `normals` [count][3] are hidden; NULL: no
- * horizon. `threads` 0: all cores; the result does not depend on them. Returns 0, or -1 where threads or
- * memory are short. */
+ * truth_light(), the light is a disc of radius w, a unit away along `towards`. Rays begin exactly at the
+ * origins, which the caller has lifted off the surface. Rays below the plane of `normals` [count][3] are
+ * hidden; NULL: no horizon. `threads` 0: all cores; the result does not depend on them. Returns 0, or -1 if
+ * threads or memory are short. */
 int truth_mesh_light(const truth_mesh *truth, size_t count, const double *origins, const float *normals,
                      const double towards[3], double w, size_t rays, int threads, float *visible);
 
