@@ -1,4 +1,4 @@
-/* Assets that tests write themselves, and what stands in those that come back. */
+/* Assets that tests write, and the content of assets that the library writes. */
 #pragma once
 
 #include "handles.h"
@@ -164,7 +164,7 @@ static inline const unsigned char *bytes_of_view(const asset *a, size_t view) {
     return a->bytes + at;
 }
 
-/* Where element i of an accessor lies, which is not sparse. */
+/* The bytes of element i of an accessor that is not sparse. */
 static inline const unsigned char *element_of(const asset *a, size_t accessor, size_t i, size_t size) {
     const json_t *given = item_of(a, "accessors", accessor);
     const size_t view = number_of(given, "bufferView");
@@ -198,7 +198,7 @@ static inline void assert_same_asset(const asset *a, const asset *b) {
     assert_memory_equal(a->bytes, b->bytes, a->size);
 }
 
-/* --- what was kept */
+/* --- content that must stay */
 
 /* `keys`: names with blanks between them. */
 static inline json_t *without(const json_t *object, const char *keys) {
@@ -232,7 +232,8 @@ static inline void assert_views_kept(const asset *in, const asset *out) {
     }
 }
 
-/* All of the input is in the output, at its place and byte by byte, but for the keys of `…_but`. */
+/* Checks that all of the input is in the output, in the same place, byte by byte. The keys `…_but` may
+ * differ. */
 static inline void assert_kept(const asset *in, const asset *out, const char *node_but,
                                const char *material_but) {
     static const char changing[] = "buffers bufferViews accessors nodes meshes materials images textures "
@@ -276,13 +277,13 @@ static inline vsh_lit_options options_of(const vsh_lit_image *images, size_t cou
 
 /* --- atlases */
 
-/* A place in the atlas that tells mesh, triangle and corner apart. */
+/* A place in the atlas that is different for each mesh, triangle and corner. */
 static inline void place_of(size_t mesh, size_t number, float uv[2]) {
     uv[0] = (float)((double)(number % 97) / 128.0 + 0.001 * (double)(mesh % 50));
     uv[1] = (float)((double)(number / 97) / 512.0);
 }
 
-/* `split`: every corner is a vertex of its own. */
+/* `split`: every corner gets its own vertex. */
 static inline vsh_lit_mesh make_lit(const vsh_model *model, size_t mesh, bool split) {
     const vsh_mesh view = vsh_model_mesh(model, mesh, 0);
     const size_t corners_count = 3 * view.triangle_count;
@@ -328,7 +329,7 @@ static inline void remove_file(const char *name) {
     assert_int_equal(unlink(at(name)), 0);
 }
 
-/* A file of tests/models lit as "out.glb", without an atlas by its own UVs; read again. */
+/* Lights a file of tests/models as "out.glb", without an atlas by its own UVs, and reads the result. */
 static inline asset light_model(const char *path, const vsh_model *model, const vsh_lit_mesh *meshes,
                                 const vsh_lit_options *options) {
     write_lit(path, model, meshes, options, at("out.glb"));

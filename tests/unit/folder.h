@@ -19,7 +19,7 @@ static inline const char *at(const char *name) {
 static inline int make_folder(void **state) {
     char here[200];
     const char *place = getenv("TMPDIR");
-    if (place == NULL) { /* where the tests were built */
+    if (place == NULL) { /* in the folder where the tests were built */
         place = getcwd(here, sizeof here);
     }
     snprintf(folder, sizeof folder, "%.200s/vdbshade-test-XXXXXX", place != NULL ? place : ".");
@@ -43,7 +43,7 @@ static inline int entries_in_folder(void) {
     return count;
 }
 
-/* Ends the bytes with 0, which its size leaves out. */
+/* Reads a file. A 0 follows the bytes, and does not count in the size. */
 static inline size_t read_all(const char *path, unsigned char **bytes) {
     FILE *file = fopen(path, "rb");
     assert_that(file != NULL, "%s is missing", path);

@@ -5,7 +5,7 @@
 
 enum { BYTES = 5120, UBYTES, SHORTS, USHORTS, UINTS = 5125, FLOATS };
 
-/* A file on its way: a buffer, and the lists of its views and accessors. */
+/* A file under construction: a buffer, and the lists of its views and accessors. */
 typedef struct maker {
     unsigned char bytes[4096];
     size_t size;
@@ -14,7 +14,8 @@ typedef struct maker {
     int count; /* of each */
 } maker;
 
-/* An accessor of all of a view of its own; returns its number. Views begin 4 bytes into their bytes. */
+/* Adds a view, and an accessor of all of it. Returns the accessor's number. Views begin 4 bytes into their
+ * bytes. */
 static inline int add(maker *m, const void *data, size_t size, const char *view, int type, int count,
                       const char *kind, const char *more) {
     const char *comma = m->count > 0 ? "," : "";
@@ -32,7 +33,7 @@ static inline int add(maker *m, const void *data, size_t size, const char *view,
 static const float QUAD[4][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
 static const float UP[4][3] = {{0, 0, 1}, {0, 0, 1}, {0, 0, 1}, {0, 0, 1}};
 
-/* One with the corners of a quad, accessor 0, and its normals, accessor 1. */
+/* Begins with accessor 0, the corners of a quad, and accessor 1, its normals. */
 static inline maker *begin(void) {
     maker *m = calloc(1, sizeof *m);
     assert_non_null(m);
@@ -58,7 +59,7 @@ static inline const char *text_of(const maker *m, const char *rest) {
 #define NODE(more) "\"scenes\":[{\"nodes\":[0]}],\"nodes\":[{\"mesh\":0" more "}],"
 #define ALONE NODE("")
 
-/* Frees the maker. */
+/* Writes and reads the file, and frees the maker. */
 static inline vsh_model *read_made(maker *m, const char *rest) {
     vsh_model *model = read_text("a.gltf", text_of(m, rest));
     free(m);

@@ -1,5 +1,5 @@
-// .vdb files for tests, written with OpenVDB what the library never would. Not with cmocka's C headers
-// before.
+// .vdb files for tests, written by OpenVDB in ways that the library never would. Include this before cmocka's
+// C headers.
 #pragma once
 
 #include <cerrno>
@@ -52,7 +52,7 @@ inline void assert_said(vsh_result result, vsh_result expected, std::initializer
 
 constexpr double RADIUS = 1.0, VOXEL = 0.05;
 
-// On one thread: what OpenVDB's own threads do is not this test's.
+// Uses one thread, because tests do not cover OpenVDB's own threads.
 template <class GridType> typename GridType::Ptr ball(double radius, float half_width) {
     openvdb::util::NullInterrupter *none = nullptr;
     return openvdb::tools::createLevelSetSphere<GridType, openvdb::util::NullInterrupter>(

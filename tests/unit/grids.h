@@ -37,7 +37,7 @@ static inline void voxel_position(const leaves *all, size_t leaf, int voxel, dou
     }
 }
 
-/* The value of a voxel, of 512 in each leaf, and where it lies. */
+/* The value and the place of a voxel, by its number: 512 in each leaf. */
 static inline double value_at(const leaves *all, size_t voxel, double position[3]) {
     voxel_position(all, voxel / 512, (int)(voxel % 512), position);
     return (double)all->leaf[voxel / 512].values[voxel % 512];
@@ -45,8 +45,8 @@ static inline double value_at(const leaves *all, size_t voxel, double position[3
 
 typedef double truth_fn(const double position[3]);
 
-/* Largest error, in voxels, over voxels whose true distance lies in -inside … outside voxels; and the signs
- * of all others that leaves hold. */
+/* Largest error, in voxels, over voxels with a true distance of -inside … outside voxels. Checks the signs of
+ * all other voxels in leaves. */
 static inline double worst_error(const vsh_grid *grid, truth_fn *truth, double inside, double outside) {
     FREED_BY(free_leaves) leaves all = leaves_of(grid);
     const double background = all.info.half_width * all.info.voxel_size;

@@ -12,7 +12,7 @@
 #include <sys/resource.h>
 #include <sys/stat.h>
 
-/* An image with values of its own at every texel: between 0 and 1, not symmetric in x, y or the channel. */
+/* An image whose values differ from texel to texel: between 0 and 1, not symmetric in x, y or the channel. */
 enum { MOST = 8 };
 
 typedef struct sample {

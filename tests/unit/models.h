@@ -12,7 +12,7 @@ const char *__lsan_default_suppressions(void) {
     return "leak:libassimp.so\n";
 }
 
-/* Fails where a test left a file. */
+/* Fails if a test left a file. */
 static inline int remove_empty_folder(void **state) {
     return rmdir(folder);
 }
@@ -67,7 +67,7 @@ static inline vsh_mesh_report check(const vsh_model *model, size_t index) {
     return report;
 }
 
-/* A quad whose UVs are its positions, but for one corner: no flip and no swap leaves them alone. */
+/* A quad whose UVs are its positions, except for one corner, so that any flip or swap changes them. */
 static const float quad_uv[4][2] = {{0.125F, 0.25F}, {1, 0}, {1, 1}, {0, 0.75F}};
 
 static const char quad_obj[] = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"

@@ -23,7 +23,7 @@ static inline vsh_outline *box(double x0, double y0, double x1, double y1) {
     return polygon(points, 4);
 }
 
-/* Lines of the height 1. */
+/* Lines of text with a height of 1. */
 static inline vsh_outline *lines_of(const char *letters, int32_t align) {
     vsh_text_options options = vsh_text_options_default();
     options.height = 1.0;
@@ -52,7 +52,7 @@ static inline double distance_to(const vsh_outline *o, const double point[2]) {
     return vshi_outline_winding(o, p) != 0 ? -distance : distance;
 }
 
-/* Anything between 0 and 1, the same in every run. */
+/* A random number between 0 and 1, the same in every run. */
 static inline double any(uint64_t i) {
     i = (i ^ (i >> 30)) * UINT64_C(0xbf58476d1ce4e5b9) + UINT64_C(0x9e3779b97f4a7c15);
     i = (i ^ (i >> 27)) * UINT64_C(0x94d049bb133111eb);
@@ -79,7 +79,7 @@ static inline double truth_square(const vsh_outline *o, double x, double y) {
 }
 
 static inline bool truth_inside(const vsh_outline *o, double x, double y) {
-    double angle = 0.0; /* by the sum of the angles that the segments are seen under */
+    double angle = 0.0; /* sum of the angles under which the point sees the segments */
     size_t count;
     const double *p;
     for (size_t c = 0; (p = contour_of(o, c, &count)) != NULL; ++c) {
@@ -110,7 +110,7 @@ static inline bool truth_hit(const vsh_outline *o, double x, double y, double dx
     return false;
 }
 
-/* Share of the light's angle by so many rays, one in the middle of each part. */
+/* Visible share of the light's angle, by one ray in the middle of each of its parts. */
 static inline double truth_visibility(const vsh_outline *o, const vsh_light *light, double x, double y,
                                       int rays) {
     double middle, half, distance = INFINITY;

@@ -5,7 +5,7 @@
 
 #include <vdbshade/picture.h>
 
-/* One cone a point, sixteen for AO; 64 rays where a test then names a method by rays. */
+/* One cone a point, sixteen for AO, and 64 rays for tests that then choose a method with rays. */
 static inline vsh_shade_options preview_options(void) {
     vsh_shade_options options = vsh_shade_options_default();
     options.method = VSH_SHADOW_CONE;

@@ -5,7 +5,7 @@
 
 #include "trace/trace.h"
 
-/* By about `rays` rays from each point, half of them in each of the library's sets. NAN: no value. */
+/* Casts about `rays` rays from each point, half of them in each of the library's two sets. NAN: no value. */
 static inline void see(vshi_truth truth, size_t count, const double *positions, const float *normals,
                        int32_t rays, float *seen) {
     truth.rays = rays > 1 ? rays / 2 : 1;
@@ -33,7 +33,7 @@ static inline void see_light(const vshi_triangles *triangles, const vshi_solids 
     see(truth, count, positions, normals, vshi_light_is_point(&truth.place) ? 1 : rays, seen);
 }
 
-/* The same of the sky within `distance`, weighted by the cosine. */
+/* The share of the sky within `distance`, weighted by the cosine. */
 static inline void see_sky(const vshi_triangles *triangles, const vshi_solids *solids, size_t count,
                            const double *positions, const float *normals, double offset, double distance,
                            int32_t rays, float *seen) {

@@ -31,7 +31,8 @@ inline void misbehave(const char *how) {
     }
 }
 
-// A program that names itself as its reader adds a line here at each start: the error that it got.
+// The file to which a program that names itself as its reader adds a line at each start: the error that it
+// got.
 constexpr const char *STARTS = "VSH_TEST_STARTS";
 constexpr const char *READS = "VSH_TEST_READS"; // the file that it reads
 
@@ -39,7 +40,7 @@ inline int read_as_host() {
     const char *starts = getenv(STARTS), *path = getenv(READS);
     std::ifstream before(starts);
     const auto lines = std::count(std::istreambuf_iterator<char>(before), {}, '\n');
-    constexpr int MOST = 4; // starts, so that the test ends also where the library fails
+    constexpr int MOST = 4; // starts, so that the test ends even if the library fails
     vsh_error error = {VSH_OK, "too many starts"};
     if (lines < MOST) {
         std::ofstream(starts, std::ios::app) << "started\n";
@@ -82,7 +83,7 @@ inline int as_reader(int argc, char **argv) {
         for (;;) {
             kept.push_back(new char[size_t(64) << 20]);
         }
-    } else if (how == "host") { // does not serve, but reads a file by a reader as its parent does
+    } else if (how == "host") { // does not serve, but reads a file by a reader, like its parent
         return read_as_host();
     } else if (how == "silent") {
         return 0;
@@ -120,7 +121,7 @@ inline vsh_run with_reader(bool wanted = true) {
     return run;
 }
 
-// The answer of a reader for a file; `request` is the part of its request behind the path.
+// The answer of a reader for a file. `request` writes the part of the request after the path.
 template <typename Request>
 std::vector<unsigned char> payload_of(vshi_serve_fn *serve, const std::string &path, Request &&request) {
     static vshi_encoder encoder;

@@ -1,4 +1,4 @@
-/* An asset that has something of everything (tests/unit/test_lit…). */
+/* An asset with a sample of every feature (tests/unit/test_lit…). */
 #pragma once
 
 #include "assets.h"
@@ -55,7 +55,7 @@ static inline void rich_vertices(asset *a, json_t **attributes) {
                   uvs, "COLOR_0", color, "_ID", id, "JOINTS_0", joint, "WEIGHTS_0", weight);
 }
 
-/* A sparse move of three vertices, and normals that all turn. */
+/* A morph target that moves three vertices, by a sparse accessor, and turns all normals. */
 static inline json_t *rich_target(asset *a) {
     const uint16_t moved[3] = {3, 4, 20};
     const float moves[3][3] = {{0, 1, 0}, {0, 2, 0}, {0, 0.5F, 0}};

@@ -1,4 +1,4 @@
-/* Surfaces of a few charts, and lightmaps of them that hold what a test says, for the tests of seams. */
+/* Surfaces of a few charts, and lightmaps of them with given values, for the tests of seams. */
 #pragma once
 #include "testing.h"
 
@@ -75,7 +75,7 @@ static inline float *new_plane(float value) {
     return plane;
 }
 
-/* The same values whenever a seed is the same. */
+/* A random value, the same in every run. */
 static inline float random_value(uint32_t *state) {
     return (float)next_random(state);
 }
@@ -125,7 +125,7 @@ static inline double between(const float *plane, const charts_mesh *first, uint3
     return most;
 }
 
-/* The same of corners of one mesh, numbered through all its quads. */
+/* The largest difference between two edges of one mesh, whose corners are numbered through all its quads. */
 static inline double across(const charts_mesh *m, const float *plane, uint32_t a, uint32_t b, uint32_t c,
                             uint32_t d) {
     return between(plane, m, a, b, m, c, d);

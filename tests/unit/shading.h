@@ -108,7 +108,7 @@ static inline void random_direction(uint64_t *counter, double direction[3]) {
     direction[2] = z;
 }
 
-/* Receivers on the seeds' floor: `size` × `size` of its 512² texels, `stride` apart, with normals up. */
+/* Receivers on the seeds' floor: `size` × `size` of its 512² texels, evenly spaced, with normals up. */
 static inline void floor_texels(size_t size, double *positions, float *normals) {
     const size_t stride = 512 / size;
     for (size_t row = 0; row < size; ++row) {
@@ -120,7 +120,8 @@ static inline void floor_texels(size_t size, double *positions, float *normals) 
     }
 }
 
-/* The same, but every third one lies in the air or inside a solid, and its normal points anywhere. */
+/* Receivers like floor_texels(), but every third one lies in the air or inside a solid, and its normal points
+ * anywhere. */
 static inline void scattered_texels(size_t size, uint64_t counter, double *positions, float *normals) {
     floor_texels(size, positions, normals);
     for (size_t i = 0; i < size * size; i += 3) {
@@ -133,7 +134,7 @@ static inline void scattered_texels(size_t size, uint64_t counter, double *posit
     }
 }
 
-/* A room of half size 1 in a box whose walls are so thick. */
+/* A room of half size 1 in a box with walls of a given thickness. */
 static inline vsh_field *hollow_box(double voxel, double wall) {
     vsh_sdf_node nodes[3] = {vsh_sdf_node_default(), vsh_sdf_node_default(), vsh_sdf_node_default()};
     nodes[0].shape = nodes[1].shape = VSH_SDF_BOX;

@@ -60,7 +60,7 @@ static inline void shape_turn(shape *s, size_t first) {
 
 enum { LEFT = 1, RIGHT = 2, FRONT = 4, BACK = 8, BOTTOM = 16, TOP = 32, ALL_SIDES = 63 };
 
-/* The sides of a box that `sides` says, each of its own four vertices; they look outwards. */
+/* Adds the sides of a box that the bits of `sides` choose, each with four vertices. They look outwards. */
 static inline void shape_box(shape *s, const double low[3], const double high[3], unsigned sides) {
     static const int corner[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4},
                                      {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};

@@ -8,7 +8,7 @@
 #include "truth/embree.h"
 #include "truth/metrics.h"
 
-/* Height 0 … 1 of sample (i, j) of `n`, the same hills whatever n. */
+/* Height 0 … 1 of sample (i, j) of n × n. The hills are the same for every n. */
 static inline float hill(int i, int j, int n) {
     const double x = (double)j / (n - 1), z = (double)i / (n - 1);
     double y = 0.5 + 0.25 * sin(9.0 * x + 2.0 * z) * cos(7.0 * z - x) + 0.12 * sin(23.0 * x - 11.0 * z) +

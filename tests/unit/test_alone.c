@@ -32,8 +32,8 @@ static truth_scene crowd(uint64_t *counter, bool walls) {
     return (truth_scene){solids, SOLIDS};
 }
 
-/* In blocks of eight by eight, as a lightmap's texels are shaded. Where they do not lie on the floor they
- * lean across the scene, with normals that turn from side to side, so that suns stand low for some. */
+/* In blocks of eight by eight, as a lightmap's texels are shaded. With `leaning`, they lie on a plane that
+ * leans across the scene, and their normals turn from side to side, so that suns stand low for some. */
 static void place_points(bool leaning) {
     for (size_t i = 0; i < MANY; ++i) {
         const size_t block = i / 64;
@@ -45,7 +45,7 @@ static void place_points(bool leaning) {
     }
 }
 
-/* Points first, first + step … by a handle, `batch` a call. */
+/* Shades `count` points by a handle, `batch` points a call. */
 static void ask(const vsh_query *query, bool ao, size_t count, size_t batch, float *values) {
     for (size_t i = 0; i < count; i += batch) {
         const vsh_points points = {count - i < batch ? count - i : batch, positions + 3 * i, normals + 3 * i,
@@ -113,8 +113,8 @@ TEST(a_sun_behind_walls_is_as_dark_for_one_point_as_for_many) {
     compare_shadows(field, &light, VSH_SHADOW_SMOOTH, VSH_SHADOW_CONE);
 }
 
-/* Lamps of which single points saw more, or less, than blocks of them before: by up to 0.2 with `cone`, by
- * all of it with `hard`. */
+/* Lamps for which single points and blocks of points once had different values: by up to 0.2 with `cone`, by
+ * 1 with `hard`. */
 TEST(lamps_among_solids_are_as_bright_for_one_point_as_for_many) {
     static const struct {
         uint64_t scene;

@@ -76,7 +76,7 @@ static fan *fan_at(float height) {
     return f;
 }
 
-/* Lookups as the standards have them. */
+/* Wraps a texel as the standards define it. */
 static int wrap(int at, int size, int32_t how) {
     if (how == VSH_WRAP_CLAMP) {
         return at < 0 ? 0 : at >= size ? size - 1 : at;
@@ -91,7 +91,7 @@ static int wrap(int at, int size, int32_t how) {
     return at < size ? at : period - 1 - at;
 }
 
-/* As the standards have it, with another sum. */
+/* Looks up alpha as the standards define it, with the sum in another order. */
 static double alpha_at(const vsh_alpha_mask *m, double u, double v) {
     const double *t = m->uv_transform;
     const double x = (t[0] * u + t[1] * v + t[2]) * m->width - 0.5;

@@ -23,7 +23,7 @@ static vsh_shade_stats shade(const vsh_occluders *casters, const vsh_shade_optio
     return shade_ao_points(casters, &points, options, NULL, ao, deviation);
 }
 
-/* By so many cones; 0: by taps. */
+/* AO of a point by `cones` cones; 0: by taps. */
 static double ao_at(const vsh_field *field, int32_t cones, double distance, const double position[3]) {
     vsh_shade_options options = options_of(cones > 0 ? VSH_AO_CONES : VSH_AO_TAPS, 64, distance);
     options.ao_cones = cones > 0 ? cones : 1;

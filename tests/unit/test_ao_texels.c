@@ -95,7 +95,7 @@ static baked *bake(const stage *s, how h) {
     options.shade.max_error = h.max_error;
     baked *b = malloc(sizeof *b);
     assert_non_null(b);
-    memset(b, 0xff, sizeof *b); /* NaN: whatever is not written shows */
+    memset(b, 0xff, sizeof *b); /* NaN, so that the test notices values that were not written */
     OWNED(vsh_charts) *charts =
         charts_from(s->receivers, h.receivers == 0 ? RECEIVERS : h.receivers, &options);
     const vsh_lightmap lightmap = {
@@ -194,7 +194,7 @@ TEST(charts_take_nothing_from_each_other) {
     assert_true(near > 100);
 }
 
-/* Windows on what is curved: under an open sky all is as it would be alone. */
+/* Windows on a curved surface: under an open sky, values are those of texels that shoot alone. */
 TEST(a_lone_ball_sees_along_its_normals) {
     const truth_solid *ball = &SOLIDS[3];
     stage s = *(stage *)*state;

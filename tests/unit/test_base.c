@@ -57,7 +57,8 @@ static uint64_t draw(void) {
     return z ^ (z >> 31);
 }
 
-/* Of any bits; coordinates, of doubles and of floats; and neighbours of powers of two. */
+/* Returns, by turns, a double of random bits, a coordinate as a double or a float, and a neighbour of a power
+ * of two. */
 static double any_double(int i) {
     const uint64_t bits = draw();
     const double coordinate = ((double)(bits >> 11) * 0x1p-53 - 0.5) * 200.0;

@@ -81,7 +81,7 @@ static void rings(void *user, size_t count, const double *positions, double *dis
     }
 }
 
-/* Every distance of a box around it, bit by bit. */
+/* Compares every distance in a box around it, bit by bit. */
 TEST(distances_of_many_positions_at_once_make_the_same_level_set) {
     const vsh_grid_options options = with_voxel(0.05);
     for (int exact = 0; exact < 2; ++exact) {

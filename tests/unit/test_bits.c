@@ -1,8 +1,8 @@
-/* The same bits: hashes of what every part computes, checked in. They hold for any number of threads,
- * instruction set, compiler (gcc, clang) and level of optimisation; `tools/bits` tries those. What depends on
- * libraries is apart: a mesh's level set on OpenVDB, what is traced on Embree (docs/security.md). A change
- * of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once checks it for one thread and
- * the base set. */
+/* Compares hashes of the results of every part with a table of hashes. They hold for any number of threads,
+ * instruction set, compiler (gcc, clang) and level of optimisation; `tools/bits` tries those. Parts that
+ * depend on libraries have hashes of their own: level sets of meshes on OpenVDB, traced values on Embree
+ * (docs/security.md). A change of a method changes its hash: VSH_BITS=print prints the table, VSH_BITS=once
+ * checks it for one thread and the base set. */
 #include "base/bytes.h"
 #include "base/floats.h"
 #include "base/job.h"
@@ -16,7 +16,7 @@
 typedef struct bits {
     uint64_t hash;
     size_t values;  /* floats that were hashed */
-    size_t changes; /* of them unlike the one before */
+    size_t changes; /* floats that differ from the one before */
 } bits;
 
 static void add_floats(bits *b, const float *values, size_t count) {
@@ -29,7 +29,7 @@ static void add_floats(bits *b, const float *values, size_t count) {
     b->values += count;
 }
 
-/* --- what is baked */
+/* --- the baked scene */
 
 enum { SIDE = 40, POINTS = SIDE * SIDE };
 
@@ -139,7 +139,7 @@ static void field_samples(const context *c, int32_t unused, bits *b) {
     add_floats(b, distance, POINTS);
 }
 
-/* The rays that were taken. */
+/* Shades and hashes the points. Returns the number of rays. */
 static uint64_t shade_by(const context *c, const vsh_light *light, const vsh_shade_options *options,
                          bits *b) {
     float value[POINTS], deviation[POINTS];
@@ -416,7 +416,7 @@ static void level_set_of_a_mesh(const context *c, int32_t unused, bits *b) {
     add_leaves(b, grid);
 }
 
-/* Charts of the asset: of no library, but for the file. */
+/* Charts of the asset. They depend on no library, except for reading the file. */
 static void atlas_of_a_mesh(const context *c, int32_t unused, bits *b) {
     vsh_mesh meshes[MOST_MESHES];
     size_t count;
@@ -460,7 +460,7 @@ static void cut_out(vsh_mesh *mesh, vsh_alpha_mask *mask, float **uvs) {
 
 enum { OF_AO = 1, CUT_OUT = 2 };
 
-/* Rays are Embree's. */
+/* Hashes exact values, whose rays are Embree's. */
 static void exact(const context *c, int32_t what, bits *b) {
     vsh_alpha_mask mask;
     FREED float *uvs = NULL;

@@ -107,7 +107,7 @@ static double below_both(double a, double b) {
     return 0.5 * (truth_disc_share(a) + truth_disc_share(b)) - 0.25 + a * b / PI;
 }
 
-/* Where circles of radius 1 and r, so far apart, overlap. */
+/* The share of the unit disc in a circle of radius r whose centre is `apart` from the disc's. */
 static double overlap(double r, double apart) {
     if (apart >= 1.0 + r) {
         return 0.0;
@@ -195,8 +195,8 @@ typedef struct trial {
     int32_t method, sampler; /* of shadow, or of AO */
     double max_error;
     int32_t width, height;
-    bool lightmap; /* else points, in no order that neighbours are in */
-    bool held;     /* lightmap: compared with the casters as well */
+    bool lightmap; /* else points in an order that separates neighbours */
+    bool held;     /* lightmap: also compared with the casters */
 } trial;
 
 typedef struct outcome {
@@ -328,7 +328,7 @@ static const double ASKED[] = {0.05, 0.02, 0.01, 0.005, 0.002, 0.001};
 /* Errors of ASKED up to `last`, in stages of every shape. */
 static int claims(bool ao, bool exact, int32_t sampler, int last) {
     const int deep =
-        sampler == VSH_SAMPLER_WHITE ? 3 : 5; /* from here on, of one shape: rays by the thousand */
+        sampler == VSH_SAMPLER_WHITE ? 3 : 5; /* smaller errors take thousands of rays: one shape only */
     int wrong = 0;
     for (int shape = 0; shape < SHAPES; ++shape) {
         if (shape == DISC && !exact) {
@@ -348,7 +348,7 @@ TEST(exact_reports_its_error_and_keeps_the_requested_one) {
     }
 }
 
-/* Blue noise is Sobol's sequence where 0.01 or less is asked. */
+/* Blue noise is replaced by Sobol's sequence if the error asked for is 0.01 or less. */
 TEST(white_and_blue_noise_report_their_error) {
     for (int ao = 0; ao < 2; ++ao) {
         assert_int_equal(claims(ao, true, VSH_SAMPLER_WHITE, 3), 0);

@@ -470,7 +470,7 @@ TEST(an_edge_that_is_cut_off_is_no_edge) {
     assert_true(isnan(m.value[VSH_MEASURE_PENUMBRA])); /* too few to say anything */
 }
 
-/* Of three planes together, by the tests' own formulas over all their values in a row. */
+/* Compares three planes with the tests' own formulas over all their values in a row. */
 TEST(accuracy_is_the_measure_of_the_tests) {
     enum { PLANES = 3, ALL = PLANES * COUNT };
     static float truth[ALL], values[ALL], masked[ALL];

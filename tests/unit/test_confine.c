@@ -40,7 +40,7 @@ static int32_t cancel_later(void *user, const char *stage, double fraction) {
 TEST(reading_spheres_is_cancelled_within_a_file) {
     FILE *file = fopen(at("spheres.csv"), "wb");
     for (int i = 0; i < 100000; ++i) {
-        fputs(i < 50000 ? "1,2,3,0.5\n" : "# said", file); /* a line of no end, too */
+        fputs(i < 50000 ? "1,2,3,0.5\n" : "# said", file); /* the second half is one long line */
     }
     assert_int_equal(fclose(file), 0);
     double seen = 0.0, *spheres;
@@ -52,7 +52,7 @@ TEST(reading_spheres_is_cancelled_within_a_file) {
     assert_true(seen > 0.2 && seen < 0.5);
 }
 
-/* Of zeros, which take no room on the disk. */
+/* Makes a file of zeros, which takes no room on the disk. */
 static void make_large(const char *path, off_t size) {
     write_string(path, "");
     assert_int_equal(truncate(path, size), 0);

@@ -88,7 +88,7 @@ static void write_card(const char *materials, const char *sampler, const char *i
     "{\"name\":\"leaf\",\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0"  \
     "}" more "}}"
 
-/* A card's file and how it is loaded; what is 0 or NULL is as most tests need it. */
+/* A card's file, and how it is loaded. Members that are 0 or NULL get the defaults in these comments. */
 typedef struct card {
     const char *material; /* masked by the disc */
     const char *sampler;  /* repeats */

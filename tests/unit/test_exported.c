@@ -57,7 +57,7 @@ static void expect(const char *name, const char *what, double value, double expe
                 what, value, expected);
 }
 
-/* Of the scene: 12 triangles of the box and 4 of the L, and no area over the L's void. */
+/* The scene has 12 triangles of the box and 4 of the L, and no area over the L's void. */
 TEST(one_scene_is_the_same_in_every_format) {
     static const struct {
         const char *name;

@@ -69,7 +69,7 @@ TEST(a_room_inside_a_solid_stays_a_room) {
     assert_int_equal(wrong_blocks(grid, hollow_truth, 10), 0);
 }
 
-/* A bound that bends: only its zero can be trusted. */
+/* A lower bound of the distance, of which only the zero is exact. */
 static double squashed(void *user, const double p[3]) {
     const double *slope = user, d = unit_sphere(p);
     return *slope * d / (1.0 + fabs(d));
@@ -166,7 +166,7 @@ TEST(too_small_a_voxel_is_refused_before_memory_is_allocated) {
     assert_less(grid_info(grid).bytes, run.memory_limit);
 }
 
-/* The megabytes that the error of a limit of one byte names. */
+/* The megabytes that the error names if the limit is one byte. */
 static double foretold(const vsh_sdf *sdf, const vsh_grid_instance *instance,
                        const vsh_grid_options *options) {
     vsh_run run = run_within(1);

@@ -1,5 +1,5 @@
-// Hosts that have set something: rounding, flush to zero, a locale with a decimal comma, arenas and threads
-// of their own. Every call gives the same bits as in a plain program, and gives back what the host had set.
+// Hosts with their own settings: rounding, flush to zero, a locale with a decimal comma, arenas and threads.
+// Every call gives the same bits as in a plain program, and restores the host's settings.
 #include <clocale>
 #include <cstring>
 #include <string>
@@ -153,7 +153,7 @@ TEST(a_decimal_comma_changes_nothing_and_is_given_back) {
     }
     char text[8];
     std::snprintf(text, sizeof text, "%.1f", 0.5);
-    assert_string_equal(text, "0,5"); // or this would test nothing
+    assert_string_equal(text, "0,5"); // else this tests nothing
     const Outcome there = work();
     std::snprintf(text, sizeof text, "%.1f", 0.5);
     std::setlocale(LC_ALL, "C");

@@ -162,7 +162,7 @@ TEST(a_picture_of_nothing_is_refused) {
 
 // --- PNG
 
-// From -0.25 to 1.5, what is none, and both infinities.
+// Values from -0.25 to 1.5, NaN, and both infinities.
 float value_at(size_t channel, size_t texel) {
     const size_t n = (texel * 7 + channel * 13) % 229;
     return n == 226   ? std::numeric_limits<float>::quiet_NaN()
@@ -306,7 +306,7 @@ TEST(light_is_srgb_and_says_so_and_all_else_is_linear_unless_a_space_is_named) {
         {light, nullptr, 8, VSH_COLOR_LINEAR, 1, as_it_is, "linear"},
         {light, nullptr, 16, VSH_COLOR_LINEAR, 1, as_it_is, "linear"},
         {light, "R=shadow.sun,A=A", 16, VSH_COLOR_SRGB, 0, srgb, "sRGB"},
-        {light, "R=shadow.sun,A=A", 16, VSH_COLOR_ENCODED, 0, as_it_is, "sRGB"}, // said, not done
+        {light, "R=shadow.sun,A=A", 16, VSH_COLOR_ENCODED, 0, as_it_is, "sRGB"}, // the values stay
         {{}, nullptr, 16, VSH_COLOR_AUTO, 1, as_it_is, "linear"},
     };
     for (const auto &one : cases) {

@@ -1,12 +1,12 @@
-/* A sample that a ray links to the one before is as that one inside a solid or outside (src/shade/inside.c,
- * src/lightmap/origins.c). The tests look at each sample by itself. */
+/* A sample that a ray links to the one before gets the same result, inside a solid or outside
+ * (src/shade/inside.c, src/lightmap/origins.c). The tests compare with each sample tested alone. */
 #include "handles.h"
 #include "lightmap/texels.h"
 #include "shade/shade.h"
 #include "testing.h"
 
 typedef struct counts {
-    size_t samples, invalid, other; /* that are said to be elsewhere than by themselves */
+    size_t samples, invalid, other; /* `other`: with another result than alone */
 } counts;
 
 /* Bakes meshes without voxels, and looks at each sample on a flat triangle anew. */

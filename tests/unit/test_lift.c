@@ -51,7 +51,7 @@ static void open_scene(scene *s, const vsh_mesh *other) {
     assert_int_equal(s->lifted.count, s->flat.count);
 }
 
-/* Beyond x = face. */
+/* Opens the scene with a wall beyond x = face. */
 static void open_beside_wall(scene *s, double face) {
     float corners[24];
     const vsh_mesh wall = box_mesh(corners, (double[]){face, -2.0, -2.0}, (double[]){3.0, 2.0, 2.0});
@@ -81,7 +81,7 @@ static double dot(const float *a, const double *b) {
     return (double)a[0] * b[0] + (double)a[1] * b[1] + (double)a[2] * b[2];
 }
 
-/* Half a degree wide. */
+/* A sun half a degree wide. */
 static vsh_light sun_towards(double x, double y, double z) {
     const double length = length3((double[]){x, y, z});
     return sun((double[]){x / length, y / length, z / length}, vsh_light_default().angle);

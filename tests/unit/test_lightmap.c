@@ -35,7 +35,7 @@ typedef struct planes {
 
 static planes *new_planes(void) {
     planes *p = malloc(sizeof *p);
-    memset(p, 0xff, sizeof *p); /* NaN: whatever is not written shows */
+    memset(p, 0xff, sizeof *p); /* NaN, so that the test notices values that were not written */
     p->lights[0] = p->shadow;
     p->all = (vsh_lightmap){
         .shadow = p->lights, .ao = p->ao, .irradiance = p->irradiance, .coverage = p->coverage};

@@ -1,4 +1,4 @@
-/* A lit asset is the asset with its light: all else comes back byte by byte. */
+/* A lit asset is the asset with its light: everything else stays, byte by byte. */
 #include "base/elementary.h"
 #include "rich_asset.h"
 #include "testing.h"
@@ -194,7 +194,7 @@ TEST(replaced_vertices_are_dropped_where_nobody_else_can_use_them) {
         if (known) {
             json_object_del(json_at(in.root, "nodes/1"), "extensions");
             json_object_del(json_at(in.root, "extensions"), "VENDOR_sound");
-            /* an image in the middle of colours: they go, it stays */
+            /* an image between bytes of colours: these go, the image stays */
             const json_t *colors =
                 item_of(&in, "bufferViews", number_of(item_of(&in, "accessors", 3), "bufferView"));
             json_t *within = json_pack("{s:i,s:I,s:i}", "buffer", 0, "byteOffset",

@@ -345,7 +345,7 @@ static void make_waves(waves *w) {
         memcpy(v->position, w->tight.positions + 3 * i, sizeof v->position);
         memcpy(v->normal, w->tight.normals + 3 * i, sizeof v->normal);
         memcpy(v->uv, w->tight.uvs + 2 * i, sizeof v->uv);
-        v->color = UINT32_MAX; /* no number */
+        v->color = UINT32_MAX; /* as a float, this is NaN */
     }
     for (size_t i = 0; i < 3 * FACES; ++i) {
         w->indices[i] = (uint16_t)w->tight.indices[i];
@@ -362,7 +362,7 @@ static void make_waves(waves *w) {
                           .uv_stride = sizeof(vertex)};
 }
 
-/* Everything that the library makes of a mesh under a cube. */
+/* All results of the library for a mesh under a cube. */
 typedef struct outcome {
     vsh_mesh_report report;
     vsh_solidity_report solidity[2];

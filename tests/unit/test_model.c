@@ -1,4 +1,4 @@
-/* Models: what files of every format become, and what is refused. */
+/* Models of files of every format, and files that are refused. */
 #include "gltf_maker.h"
 
 static void assert_quad_uvs(const vsh_model *model, int32_t uv_set, float scale) {
@@ -285,7 +285,7 @@ TEST(files_that_cannot_be_read_are_refused_with_a_reason) {
 /* Cuts a file at every length. A file that is still read must be a mesh that passes its check. Formats that
  * know their own length must notice every cut, unless it loses white space only. */
 static void cut_everywhere(const char *name, const void *bytes, size_t size, bool knows_its_length) {
-    char *copy = malloc(size + 1); /* of the very size, so that a sanitizer sees what is read past it */
+    char *copy = malloc(size + 1); /* of exactly this size, so that a sanitizer sees reads past the end */
     memcpy(copy, bytes, size);
     size_t last = size;
     while (last > 0 && (copy[last - 1] == '\n' || copy[last - 1] == ' ')) {
@@ -480,7 +480,7 @@ TEST(material_libraries_decide_which_meshes_are_blended) {
     assert_int_equal(unlink(at("own.mtl")), 0);
 }
 
-/* A small file can unfold to much memory, which is compared with the limit first. */
+/* A small file may need much memory. This is compared with the limit before it is allocated. */
 TEST(memory_is_held_against_the_limit) {
     enum { COUNT = 50000 };
     FREED char *text = malloc(COUNT * 8 + sizeof corners);

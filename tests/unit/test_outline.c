@@ -294,7 +294,7 @@ TEST(an_anti_aliased_disc_is_round) {
     }
 }
 
-/* Pixels that touch at corners only: by the middle of the four. */
+/* Pixels that touch only at corners: the middle of the four decides. */
 TEST(corners_join_by_their_middle) {
     float plane[16] = {0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0};
     vsh_mask_options options = vsh_mask_options_default();

@@ -1,4 +1,4 @@
-/* Outputs tell from which settings and inputs they were made. Files carry this. */
+/* Outputs list the settings and inputs that they were made from, as attributes of their files. */
 #include "casts.h"
 #include "images.h"
 #include "previews.h"

@@ -43,7 +43,7 @@ static int fill_points(void **state) {
     return 0;
 }
 
-/* Everything of `points`, into values and deviations; AO is the last. */
+/* Shades `points` for all lights and AO, which is the last, into values and deviations. */
 static vsh_shade_stats ask(const vsh_query *query, const vsh_points *points, int32_t threads) {
     float *const visibility[LIGHTS] = {values[0], values[1]};
     float *const deviation[LIGHTS] = {deviations[0], deviations[1]};
@@ -261,7 +261,7 @@ TEST(bad_arguments_are_refused_by_name) {
 
 /* --- strides, floats, answers with gaps; distance and gradient */
 
-/* As an engine's vertices stand in memory. */
+/* A vertex as engines store it in memory. */
 typedef struct vertex {
     float position[3];
     uint8_t colour[4];

@@ -1,4 +1,4 @@
-// Files parsed by a reader: the same bits as in this process, and nothing of a reader's failures reaches it.
+// Files parsed by a reader give the same bits as in this process, which survives all failures of the reader.
 #include "readers.h"
 
 #include <dirent.h>
@@ -25,7 +25,7 @@ std::string ball_file() {
 
 // --- the same bits
 
-// A handle read in this process, and one by a reader.
+// A handle read in this process, and one read by a reader.
 template <typename Handle> struct Both {
     Handle *here = nullptr, *there = nullptr;
     void (*const release)(Handle *);
@@ -429,7 +429,7 @@ TEST(sizes_in_a_file_do_not_pass_the_memory_limit) {
     }
 }
 
-// Leaves far from each other take nodes of 300 kB each, of which hardly anything stands in the file.
+// Leaves far from each other need nodes of 300 kB each, although the file hardly stores them.
 TEST(readers_keep_the_memory_limit) {
     if (VSHI_SANITIZED) { // sanitized readers have no limit
         skip();
@@ -654,7 +654,7 @@ TEST(a_message_is_not_read_past_its_end) {
     assert_true(decoder.bad);
 }
 
-// An answer is memory, too: it ends where the heap leaves it no room, whatever each may come to alone.
+// An answer is memory, too: it fails if it does not fit beside the heap, even if each alone would fit.
 TEST(an_answer_and_the_heap_share_their_room) {
     if (VSHI_SANITIZED) {
         skip(); // its heap is not libc's, which tells what it holds

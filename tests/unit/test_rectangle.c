@@ -67,7 +67,7 @@ static bool is_cut(const double a[3], const double b[3]) {
     return false;
 }
 
-/* Fraction of the light's solid angle that a point sees, in *solid all of it. */
+/* Fraction of the light's solid angle that a point sees. *solid is the whole solid angle. */
 static double look(const vsh_light *light, const double *from, const float *normal, bool in_the_way,
                    double *solid) {
     double n[3], all = 0.0, seen = 0.0;

@@ -319,7 +319,7 @@ static const double ws[WIDTHS] = {0.0, 0.05, 0.1, 0.3}, voxels[VOXELS] = {0.16, 
 /* Shadows by each width of light and method, then AO; NAN for methods that are not here. */
 static double rmse[CASES][VOXELS];
 
-/* Of the methods that know the whole penumbra; the others' errors are their definition's. */
+/* Measures methods that know the whole penumbra. Errors of the others come from their definitions. */
 static void measure_all_voxels(void) {
     place_floor();
     for (int v = 0; v < VOXELS; ++v) {

@@ -108,7 +108,7 @@ TEST(methods_that_need_voxels_are_refused_without_them) {
                      VSH_ERROR_ARGUMENT);
 }
 
-/* --- what is chosen */
+/* --- chosen resolutions */
 
 static int32_t chosen(const char *more, const char *casters, double points) {
     char text[2048];

@@ -172,7 +172,7 @@ TEST(charts_of_equal_values_stay_to_the_bit) {
     }
 }
 
-/* Noise, which asks for far more than the limit. */
+/* Noise, whose seams differ by far more than the limit. */
 TEST(no_value_moves_by_more_than_the_limit_or_out_of_its_range) {
     const double limits[] = {0.0, 0.003, 0.02, 1.0};
     for (size_t l = 0; l < COUNT_OF(limits); ++l) {

@@ -26,7 +26,7 @@ static vsh_shade_options options_of(int32_t method, int32_t rays, double max_err
     return options;
 }
 
-/* Points across what casters do to a light straight above, by their truth; what a method is off. */
+/* Compares a method with the truth at points in a row, under a light straight above. */
 static truth_metrics compare_across(truth_scene scene, double w, double from, double step, size_t count,
                                     vsh_shade_options options) {
     OWNED(vsh_field) *field = field_of(scene, 0.02, 0.0);
@@ -113,7 +113,7 @@ static float known_within = 0.01f;
 
 typedef double light_fn(double column, double row);
 
-/* Finds what is wanted by `light`; how many. */
+/* Answers the wanted points by `light`. Returns their number. */
 static int answer(vshi_interpolation *share, light_fn *light) {
     int wanted = 0;
     for (size_t k = 0; k < POINTS; ++k) {
@@ -135,7 +135,7 @@ static int still_open(const vshi_interpolation *share) {
     return open;
 }
 
-/* Shares by a light at both levels; how many are left. */
+/* Interpolates a light on both levels. Returns the number of points that are left. */
 static int run(vshi_interpolation *share, light_fn *light, int wanted[VSHI_INTERPOLATION_LEVELS]) {
     for (size_t k = 0; k < POINTS; ++k) {
         const double seen = light((double)(k % SQUARE), (double)(k / SQUARE));

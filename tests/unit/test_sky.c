@@ -1,4 +1,4 @@
-/* The channel `sky`: what of an even sky is seen, however far the casters, against form factors. */
+/* The channel `sky`: the visible share of an even sky, with casters at any distance, against form factors. */
 #include "shading.h"
 #include "testing.h"
 #include "truth/metrics.h"

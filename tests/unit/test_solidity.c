@@ -122,8 +122,8 @@ TEST(small_holes_do_not_make_a_solid_hollow) {
     assert_kinds_of(s, "trunk", "S");
 }
 
-/* Of many meshes, on any number of threads, each is found to be what it is alone, and is closed by its own
- * caps. */
+/* Among many meshes, on any number of threads, each mesh has the kind that it has alone, and is closed by its
+ * own caps. */
 TEST(meshes_with_holes_do_not_change_each_other) {
     enum { MESHES = 9 };
     shape *shapes[MESHES];

@@ -5,7 +5,7 @@
 
 static const double ORIGIN[3] = {0, 0, 0};
 
-/* Unwraps a mesh into a square of so many texels, and looks at all of it. */
+/* Unwraps a mesh into a square of `size` texels, and checks the atlas. */
 static vsh_atlas_info unwrap_mesh(const vsh_mesh *mesh, int32_t size) {
     const vsh_unwrap_options o = unwrap_into(size);
     return unwrap_well(mesh, 1, &o, NULL);
@@ -63,7 +63,7 @@ static void sheet_at(double u, double v, double p[3]) {
     p[2] = 0.05 * p[0] * p[0];
 }
 
-/* One of which looks the other way: each hangs together by itself. */
+/* One of the copies looks the other way. Each copy must stay connected. */
 static void three_copies_of_a_bent_sheet(shape *s) {
     for (int copy = 0; copy < 3; ++copy) {
         const size_t first = s->triangles;
@@ -144,7 +144,7 @@ TEST(bars_are_cut_along_edges_that_shading_shows) {
     }
 }
 
-/* Two leaves of a hinge that is nearly shut, whatever its shading says. */
+/* Two leaves of a hinge that is nearly shut, with any shading normals. */
 TEST(surfaces_folded_onto_themselves_are_cut) {
     for (int shut = 0; shut < 2; ++shut) {
         FREED shape *s = shape_new();

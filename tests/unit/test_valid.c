@@ -60,7 +60,7 @@ static vsh_mesh mesh_of(yard *s) {
     return mesh;
 }
 
-/* A lightmap of AO, and what is behind it. */
+/* A lightmap of AO, and the data that it was baked from. */
 typedef struct baked {
     vsh_charts *charts;
     texel_list *texels;
@@ -121,7 +121,7 @@ static double depth_in(const yard *s, const double p[3]) {
     return deepest;
 }
 
-/* How deep the boxes hold what is a hair above a sample. */
+/* How deep the point a hair above a sample is in the boxes. */
 static double depth_above(const yard *s, const baked *b, size_t i) {
     const float *n = b->samples.geometric_normals + 3 * i;
     double above[3];

@@ -245,8 +245,8 @@ TEST(a_lightmap_and_a_band_agree_where_texel_and_voxel_meet) {
     }
 }
 
-/* A sphere and a terrain beside the field, neither in voxels: values are those of queries, what is within
- * them is inside, and free space has no AO that they would know of. */
+/* A sphere and a terrain beside the field, neither in voxels: values are those of queries, voxels within them
+ * are inside, and they have no AO in free space. */
 TEST(casters_without_voxels_hide_light_and_are_solid) {
     static const double high_ball[4] = {1.6, 1.6, 0.0, 0.4},
                         down[12] = {1, 0, 0, 0, 0, 1, 0, -2.0, 0, 0, 1, 0};

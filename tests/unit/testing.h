@@ -118,7 +118,7 @@ static inline void check_below(double value, double limit, int or_equal, const c
     }
 }
 
-/* A message is of the call itself, never of one before. */
+/* Clears the message first, so that a report never shows an earlier call's message. */
 #define assert_ok(call) check_result((failure.message[0] = '\0', (call)), VSH_OK, "", __FILE__, __LINE__)
 
 /* The call fails with this code, and its message has this part. */

@@ -236,7 +236,7 @@ static inline void look_at_padding(const vsh_atlas_info *info, int padding, cons
     }
 }
 
-/* Holds an atlas against all that it promises. */
+/* Checks everything that an atlas promises. */
 static inline void look_at_atlas(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o,
                                  const vsh_atlas *atlas) {
     const vsh_atlas_info info = atlas_info(atlas);
@@ -288,7 +288,7 @@ static inline vsh_unwrap_options unwrap_into(int32_t size) {
     return o;
 }
 
-/* Unwraps, looks at it, and tells of it. */
+/* Unwraps the meshes and checks the atlas. Returns its info. */
 static inline vsh_atlas_info unwrap_well(const vsh_mesh *meshes, size_t count, const vsh_unwrap_options *o,
                                          vsh_atlas **kept) {
     vsh_atlas *atlas = NULL;
