@@ -1,6 +1,6 @@
-/* Prints the table of src/shade/ao.c and its remaining errors. The table gives the open share of an AO
- * cone from its closest approach to the casters and from the openness of its neighbours, fitted to analytic
- * rays. The scenes (boxes, slats, spheres, closed rooms) measure nothing else. Run it after a change of the
+/* Prints the table of src/shade/ao.c and its remaining errors. The table gives the open share of an AO cone
+ * from its closest approach to the casters and from the openness of its neighbours, fitted to analytic rays.
+ * The scenes (boxes, slats, spheres, closed rooms) are only used for this. Run it after a change of the
  * cones' directions or widths. Cones march the field without vshi_shade_grown(): fitted with it, sixteen
  * cones were 0.001 brighter on the cloister. */
 #include "analytic.h"
@@ -132,7 +132,8 @@ static void place_points(sample_set *set, truth_scene scene, double half, double
     }
 }
 
-/* Against the solids themselves, so that the table corrects the rounding of the field on average. */
+/* Traces rays against the solids themselves, so that the table corrects the rounding of the field on
+ * average. */
 static void find_truth(sample_set *set, truth_scene scene) {
     for (size_t i = 0; scene.count > 0 && i < set->count; ++i) {
         const float *n = set->normals + 3 * i;

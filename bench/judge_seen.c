@@ -30,7 +30,7 @@ static const double PI = 3.14159265358979323846;
 typedef struct answer {
     bool judged;
     float seen, truth,
-        product; /* the image, the better of the rays' answers, both sets' differences multiplied */
+        product; /* value in the image, the better answer of the rays, product of both sets' differences */
 } answer;
 
 typedef struct point {

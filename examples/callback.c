@@ -1,5 +1,4 @@
-/* A shape that a function gives: a torus becomes a level set, torus.vdb, and AO is asked for along its axis.
- */
+/* A shape from a function: makes the level set of a torus, torus.vdb, and shades AO along its axis. */
 #include <math.h>
 #include <stdio.h>
 #include <vdbshade/vdbshade.h>

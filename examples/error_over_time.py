@@ -3,7 +3,7 @@
 A notebook in a file: each `# %%` is a cell. Usage: error_over_time.py [MODEL] [-o PICTURE] [--size TEXELS] [--truth RAYS]
 Needs python3-matplotlib."""
 
-# %% What is asked
+# %% The command line
 import argparse
 import pathlib
 import statistics
@@ -22,9 +22,9 @@ ask = argparse.ArgumentParser(description="plots error over time")
 ask.add_argument("model", nargs="?", default=pathlib.Path(__file__).parent.parent / "assets/smooth.glb")
 ask.add_argument("-o", "--output", default="error_over_time.png")
 ask.add_argument("--size", type=int, default=256, help="texels of the lightmap's side")
-ask.add_argument("--truth", type=int, default=4096, help="rays a texel that stand for the truth")
+ask.add_argument("--truth", type=int, default=4096, help="rays a texel for the truth")
 ask.add_argument("--resolution", type=int, default=512, help="voxels along the casters' longest side")
-ask.add_argument("--rounds", type=int, default=3, help="bakes of each kind, of which the median's time counts")
+ask.add_argument("--rounds", type=int, default=3, help="bakes of each kind; their median time counts")
 given = ask.parse_args()
 
 # %% Casters with triangles and voxels, texels, a sun of three degrees
@@ -34,7 +34,7 @@ charts = vdbshade.Charts(model, width=given.size, height=given.size)
 sun = vdbshade.Light("directional", direction=(0.6, 0.75, 0.5), angle=np.radians(3))
 run = vdbshade.Run(threads=1, warning=lambda message: None)
 
-# %% The truth: rays against the triangles, of another frame than those that are held against it
+# %% The truth: rays against the triangles, of another frame than the bakes that are compared with it
 truth = vdbshade.bake_lightmap(occluders, charts, sun, method="exact", max_error=1e-4, rays=given.truth, frame=7, run=run)
 valid = truth["A"] > 0.5
 

@@ -15,7 +15,7 @@ ADDON, PROGRAM, FOLDER = sys.argv[sys.argv.index("--") + 1:]
 
 
 def load_addon():
-    """As Blender does it: a module, its preferences, its classes."""
+    """Loads the add-on as Blender does: a module, its preferences, its classes."""
     name = "vdbshade_bake"
     spec = importlib.util.spec_from_file_location(name, os.path.join(ADDON, "__init__.py"), submodule_search_locations=[ADDON])
     module = importlib.util.module_from_spec(spec)
@@ -288,7 +288,7 @@ def test_suzanne_is_laid_out_without_stretch_and_keeps_her_faces():
 
 
 def crown():
-    """A cylinder whose caps are bent so much that no chart holds all of a cap."""
+    """A cylinder whose caps bend so much that one chart cannot hold a cap."""
     start(lightmap=False)
     bpy.ops.mesh.primitive_cylinder_add(vertices=9, calc_uvs=False)
     obj = bpy.context.object
@@ -311,7 +311,7 @@ def test_bent_faces_that_the_lightmap_parts_become_triangles():
 def test_a_bake_that_fails_gives_bent_faces_back():
     obj = crown()
     before = [tuple(face.vertices) for face in obj.data.polygons]
-    bpy.data.objects.remove(bpy.data.objects["sun"])  # what is asked for after the layout
+    bpy.data.objects.remove(bpy.data.objects["sun"])  # the add-on needs it after the layout
     assert "no sun" in error_of(bpy.ops.vdbshade.bake)
     assert [tuple(face.vertices) for face in obj.data.polygons] == before
     assert not obj.data.uv_layers
@@ -377,7 +377,7 @@ def test_a_bake_that_fails_takes_its_uvs_back():
     other = bpy.data.objects.new("other", floor.data)
     other.location.x = 2.0
     bpy.context.collection.objects.link(other)
-    bpy.data.objects.remove(bpy.data.objects["sun"])  # what is asked for after the layout
+    bpy.data.objects.remove(bpy.data.objects["sun"])  # the add-on needs it after the layout
     bpy.context.view_layer.update()
     select(floor, other)
     assert "no sun" in error_of(bpy.ops.vdbshade.bake)

@@ -75,7 +75,7 @@ LIST
     done
 }
 
-# terminal COLUMNS ARG …: what the program writes to a terminal of that width, a line for each time it begins one.
+# terminal COLUMNS ARG …: prints the program's output to a terminal of that width, a line for each line that it begins or rewrites.
 terminal() {
     script -qec "stty cols $1; exec $(printf '%q ' "$VDBSHADE" "${@:2}")" /dev/null | tr '\r' '\n'
 }

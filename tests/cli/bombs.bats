@@ -1,7 +1,7 @@
-# Small files that ask for much memory are refused before it is taken.
+# Small files that need much memory are refused before it is allocated.
 load helper
 
-# within MB ARGUMENT…: the program on one thread, where the system refuses it more data than that.
+# within MB ARGUMENT…: runs the program on one thread, with a limit on its data.
 within() {
     local most=$1
     shift

@@ -45,7 +45,7 @@ setup() {
     cd "$BATS_FILE_TMPDIR" || return 1
 }
 
-# line CHANNEL: what was said of it.
+# line CHANNEL: prints the line of output about the channel.
 line() {
     local one
     for one in "${lines[@]}"; do
@@ -53,7 +53,7 @@ line() {
     done
 }
 
-# of_sun EXPRESSION: of Python, on what the JSON on standard output has of shadow.sun.
+# of_sun EXPRESSION: evaluates a Python expression on the values of shadow.sun in the JSON on standard output.
 of_sun() {
     python3 -c 'import json, sys
 sun = next(one for one in json.load(sys.stdin)["channels"] if one["name"] == "shadow.sun")
@@ -66,7 +66,7 @@ fails() {
     [ "$(of_sun "'$2' in sun['failed'] and not set('$3'.split()) & set(sun['failed'])")" = True ] || fail "$1: $2"
 }
 
-# between LEAST MEASURE MOST: of shadow.sun
+# between LEAST MEASURE MOST: whether that measure of shadow.sun is between the two.
 between() {
     [ "$(of_sun "$1 <= sun['measures']['$2'] <= $3")" = True ] || fail "$2 is $(of_sun "sun['measures']"), not within $1 … $3"
 }

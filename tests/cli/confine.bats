@@ -58,7 +58,7 @@ unharmed() {
     refused 2 'taken over: 4 threads, 48 calls, let through: none'
 }
 
-# can PART: whether this system confines a reader so far.
+# can PART: whether this system supports that part of a reader's confinement.
 can() {
     "$VDBSHADE" bake box.obj -o probe.exr "${SMALL[@]}" --quiet --stats probe.json
     grep -A 4 '"confined": {' probe.json | grep -q "\"$1\": true"

@@ -64,7 +64,7 @@ made() {
     made cloister.exr cloister.png seeds.exr
 }
 
-# options_of FILE …: each option that is named there, once. Those of other programs are left out.
+# options_of FILE …: lists each option in the files once, without those of other programs.
 options_of() {
     grep -ohE -- '(^|[^[:alnum:]-])--[a-z][a-z0-9-]*' "$@" | grep -oE -- '--.*' | sort -u |
         grep -vxE -- '--(cflags|libs|install|stat|leak-check|preset|count|limit|runs|seconds|array|partition|retries|wd|wrap|kill-on-invalid-dep|build|component|prefix|static|test|exclude-libs|system-site-packages|python)' # of CMake, pkg-config, git, Python, Blender, tools/…

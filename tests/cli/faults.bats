@@ -32,7 +32,7 @@ QUERY=(query box.obj --sun 0.3,1,0.2 --sun-angle 5 --resolution 24 --points poin
     [ "$killed" -gt 0 ] || fail "none was killed"
 }
 
-# full_at FILE SIZE COMMAND …: the command on a disk that takes SIZE bytes of a file, which are to be enough for the error.
+# full_at FILE SIZE COMMAND …: runs the command on a disk that takes SIZE bytes of a file, enough for the error message.
 full_at() {
     local file=$1 size=$2
     shift 2

@@ -235,12 +235,12 @@ succeed_saying() {
     checked 0 says "$@"
 }
 
-# succeed_printing TEXT … -- ARG …: the same of standard output.
+# succeed_printing TEXT … -- ARG …: likewise for standard output.
 succeed_printing() {
     checked 0 prints "$@"
 }
 
-# differ_printing TEXT … -- ARG …: the same of what `compare` and `regress` print of differences.
+# differ_printing TEXT … -- ARG …: likewise for the output of `compare` and `regress` if there are differences.
 differ_printing() {
     checked 1 prints "$@"
 }

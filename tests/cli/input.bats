@@ -91,7 +91,7 @@ refuse_input() {
 LIST
 }
 
-# What stands in a file may take a hundred times its size, and is refused before it does.
+# The content of a file may need a hundred times the file's size in memory. It is refused before it takes that.
 @test "a scene of a million empty objects is refused within the memory limit, by every command that reads one" {
     { printf '[{}'; yes ',{}' | head -n 1000000 | tr -d '\n'; printf ']'; } >bomb.json
     local command

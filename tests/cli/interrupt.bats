@@ -1,8 +1,8 @@
 # Signals: SIGINT, SIGTERM and SIGHUP.
 load helper
 
-# interrupted SIGNAL SECONDS ARG …: runs the program until it says something, waits, and sends the signal, which must end it. Sets
-# took, the time that it takes to end, ms. A shell's background jobs ignore SIGINT until the program has its own handler, so an earlier
+# interrupted SIGNAL SECONDS ARG …: runs the program until it prints something, waits, and sends the signal, which must end it. Sets
+# took, the milliseconds until it ended. A shell's background jobs ignore SIGINT until the program has its own handler, so an earlier
 # signal would be lost. A run that is not interrupted ends by its limit of processor seconds.
 interrupted() {
     local pid start

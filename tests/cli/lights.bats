@@ -10,7 +10,7 @@ write_lit() {
 GLTF
 }
 
-# A node that carries light $1 and looks straight down; $2: more of it.
+# A node with light $1 that points straight down; $2: more members.
 down() {
     printf '{"matrix": [1,0,0,0, 0,0,-1,0, 0,1,0,0, %s,1], "name": "%s", "extensions": {"KHR_lights_punctual": {"light": %d}}}' \
         "$3" "$2" "$1"

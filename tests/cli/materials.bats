@@ -68,7 +68,7 @@ bake() {
     succeed bake "$1" "${BAKE[@]}" --receive floor -o "$2" "${@:3}"
 }
 
-# bake_obj STATEMENTS OUT [options]: the same of write_obj().
+# bake_obj STATEMENTS OUT [options]: bakes the floor of write_obj().
 bake_obj() {
     write_obj "$1"
     bake level.obj "${@:2}"

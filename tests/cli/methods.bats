@@ -21,7 +21,7 @@ write_fence() {
     } >"$1"
 }
 
-# said CHANNEL KEY: the value in s.json of "shadow" or "ao".
+# said CHANNEL KEY: prints the key's value in s.json, of "shadow" or "ao".
 said() {
     sed -n "/\"$1\": {/,/}/s/.*\"$2\": \"\{0,1\}\([^\",]*\).*/\1/p" s.json
 }
@@ -81,7 +81,7 @@ said() {
     [[ $stderr != *"casts nothing"* ]] || fail "$stderr"
 }
 
-# The project's own bakes: every method, kind of caster and kind of output, against what they were.
+# The project's own golden bakes: every method, kind of caster and kind of output.
 @test "the project's scenes bake as they did" {
     succeed regress "$BATS_TEST_DIRNAME/../golden"
     [ "$(grep -c ': alike$' <<<"$output")" -eq 15 ] || fail "not all cases"

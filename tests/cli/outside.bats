@@ -10,7 +10,7 @@ prepare() {
     old_output elsewhere/mine.exr
 }
 
-# Every run of the program must end by itself soon.
+# Fails if the program does not end soon by itself.
 shade() {
     run --separate-stderr timeout "${VSH_SLOWER:-1}0" "$VDBSHADE" "$@"
     [ "$status" -ne 124 ] || fail "it hung: $*"
@@ -70,7 +70,7 @@ shade() {
             succeed info "inside/$file" $trust --allow-outside
         done
     done
-    # where every file is a link to one store, the model's own place is as good
+    # every file may be a link into one store: then files beside the model's target are allowed, too
     mkdir links
     cp "$MODELS/scene.gltf" d.gltf
     ln -s ../d.gltf links/d.gltf

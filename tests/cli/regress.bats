@@ -136,7 +136,7 @@ LIST
     clean
 }
 
-# asking OPTION …: a folder whose list asks for them, of `bake` or $COMMAND.
+# asking OPTION …: makes a folder whose list has the options for `bake` or $COMMAND.
 asking() {
     local words
     words=$(printf ', "%s"' "$@")

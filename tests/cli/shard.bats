@@ -17,7 +17,7 @@ parts() {
     done
 }
 
-# one_is OUT "N …" INPUT [options]: each number of parts comes to what one bake does, which stays in one/.
+# one_is OUT "N …" INPUT [options]: merging each number of parts gives the same as one bake, whose output stays in one/.
 one_is() {
     local out=$1 n
     mkdir -p one

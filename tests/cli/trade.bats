@@ -53,7 +53,7 @@ JSON
 BALL='{"sdf": {"shape": "sphere", "radius": 0.5, "translate": [0.5, 2, 0.5]}}'
 BOX='{"mesh": "box.obj"}'
 
-# rmse OPTIONS: that of the run with these options.
+# rmse OPTIONS: prints the RMSE of the run with these options.
 rmse() {
     awk -F, -v options="$1" '$3 == options { print $11 }' trade.csv
 }

@@ -61,7 +61,7 @@ fits() {
 @test "unknown commands and options, missing values and extra words are usage errors" {
     shade
     refused 2 'no command'
-    # an abbreviation is none, as the next version may have another option of that beginning
+    # abbreviations are refused, because the next version may have another option that begins so
     refuse_each <<'LIST'
 2 'did you mean bake?' | backe
 2 --verson | --verson
@@ -195,7 +195,7 @@ help_of() {
     awk -v option="--$1" '$1 ~ /^-/ || /^$/ { here = $1 == option } here { printf "%s ", $0 }' help.txt | tr -s ' '
 }
 
-# Holds help.txt against the tables of options on standard input, of which at least $1 are in both.
+# Compares help.txt with the tables of options on standard input. At least $1 options must be in both.
 expect_ranges() {
     local checked=0 key default range option text
     while IFS='|' read -r _ key _ default range _; do

@@ -30,7 +30,7 @@ prepare() {
 
 @test "a bake with all texels inside solids is refused, and the old output stays" {
     old_output out.exr
-    # what everything else lies within is a sky dome, unless it is said to be solid
+    # an object around everything else is a sky dome, unless the user says that it is solid
     refuses 2 box.obj "inside solids" info -- \
         bake box.obj --caster around.obj --treat box=solid --ao 0.5 --method exact --ao-method exact --size 32 --resolution 24 -o out.exr
     untouched out.exr
@@ -63,7 +63,7 @@ prepare() {
     [[ $stderr == *"charts lie closer than a texel"*"mesh 'box'"*"from --size 2"[56]" on"* ]] || fail "not told"
     succeed bake box.obj "${SMALL[@]}" --size 26 -o out.exr
     [[ $stderr != *"charts lie closer"* ]] || fail "told for no reason"
-    # no size parts charts that touch
+    # no size separates charts that touch
     sed 's/^vt 0.31 /vt 0.33 /; s/^vt 0.35 /vt 0.33 /' box.obj >touching.obj
     succeed_saying "they touch" "margin" -- bake touching.obj "${SMALL[@]}" --size 64 -o out.exr
 }

@@ -1,7 +1,7 @@
 # voxelize: level sets of meshes and scenes; solids, rooms and open meshes, detected or named; AO beside studs.
 load helper
 
-# A box whose faces look inwards, and one without a side.
+# A box whose faces look inwards, and one that lacks a side.
 prepare() {
     sed -E 's/^f ([^ ]*) ([^ ]*) ([^ ]*)/f \1 \3 \2/' box.obj >room.obj
     sed '$d' box.obj | sed '$d' >crate.obj

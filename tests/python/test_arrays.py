@@ -1,4 +1,4 @@
-"""Arrays: used as they are where their layout fits, converted where that is safe, refused in clear words where not."""
+"""Arrays: used without a copy if their layout fits, else converted if that is safe, else refused with a clear message."""
 import unittest
 
 import numpy
@@ -28,7 +28,7 @@ class NoCopy(Case):
             self.assertEqual({address(mine), address(its)}, {at(pointer)})
 
     def test_a_copy_of_a_mesh_is_not_looked_at_again(self):
-        """Float64 positions are copied, at once: what is done to them afterwards is not seen."""
+        """Float64 positions are copied at once, so later changes have no effect."""
         positions = BOX.astype(numpy.float64)
         mesh = vdbshade.Mesh(positions, BOX_TRIANGLES)
         positions[:] = numpy.nan

@@ -40,7 +40,7 @@ class Errors(Case):
         self.refused(vdbshade.UnsupportedError, "extension", vdbshade.Model, self.folder / "a.gltf")
 
     def test_damaged_files_are_read_apart(self):
-        """Files are read by the confined reader unless it is asked otherwise."""
+        """The confined reader reads files, unless the caller turns it off."""
         vdbshade.Grid.from_meshes(box(), resolution=32).write(self.folder / "cut.vdb")
         whole = (self.folder / "cut.vdb").read_bytes()
         (self.folder / "cut.vdb").write_bytes(whole[: len(whole) // 2])
@@ -151,7 +151,7 @@ class Running(Case):
                 vdbshade.Grid.from_meshes(sheet, resolution=16, run=vdbshade.Run(notes=True))
 
     def test_other_threads_run_meanwhile(self):
-        """A call without progress, in a thread other than the main one, has no callbacks that would let others in."""
+        """A call without progress, in a thread other than the main one, has no callbacks, in which other threads could run."""
         query = vdbshade.Query(vdbshade.Occluders(box()), max_error=1e-4, rays=4096)
         positions, normals = points_on_floor(4000)
         done = []

@@ -1,4 +1,4 @@
-"""All of the C library is within reach of Python, and it is what the headers say: functions, options, words, layouts."""
+"""Python reaches all of the C library, and agrees with the headers: functions, options, words, layouts."""
 import functools
 import gc
 import json
@@ -166,7 +166,7 @@ class Reach(Case):
         self.assertIsNone(occluders.layer_field("ground"))
 
     def hidden(self):
-        """A square that is all hidden takes the values of one in the same place."""
+        """A square that is wholly hidden gets the values of another one in the same place."""
         meshes = [vdbshade.Mesh(FLOOR, FLOOR_TRIANGLES, uvs=FLOOR_UVS * [0.4, 0.8] + [shift, 0.1]) for shift in (0.05, 0.55)]
         charts = vdbshade.Charts(meshes, width=32, height=32)
         ao, coverage = numpy.full((32, 32), 0.5, numpy.float32), vdbshade.bake_lightmap(vdbshade.Occluders(box()), charts)["A"]
@@ -176,7 +176,7 @@ class Reach(Case):
         self.assertTrue((ao[:, 16:][hidden] == 0.5).all())
 
     def pages(self):
-        """Objects have pages of their own, as they ask; borders between pages are stitched."""
+        """Objects get their own pages if the options ask for it; borders between pages are stitched."""
         v, glb = vdbshade, ASSETS / "cloister.glb"
         model = v.Model(glb)
         rule = model[0].name
@@ -234,7 +234,7 @@ class Reach(Case):
         self.refused(ValueError, "align 'mask': expected one of left, center, right", _core.Filled, "vsh_text_options", align="mask")
 
     def test_options_are_those_of_the_headers_with_their_defaults(self):
-        """Each option struct is begun by its defaults, and vdbshade.types tells its members."""
+        """Each option struct begins with its defaults, and vdbshade.types lists its members."""
         structs = generate.structs(TEXT)
         options = [s for s, members in structs.items() if members[0].name == "struct_size"]
         self.assertGreater(len(options), 25)
@@ -250,7 +250,7 @@ class Reach(Case):
         self.assertIn("0 … 4096", types.ShadeOptions.__doc__)
 
     def test_layouts_are_the_compilers(self):
-        """Sizes and places of all members, as the C compiler has them."""
+        """Sizes and places of all members agree with the C compiler."""
         lines, want = [], []
         for struct in generate.structs(TEXT):
             lines.append(f'printf("{struct} %zu\\n", sizeof({struct}));')

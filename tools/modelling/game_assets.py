@@ -87,7 +87,7 @@ def corridors():
 
 
 def wall_with(length, height, thick, holes):
-    """Along x from 0, between y = 0 and thick, built of boxes around holes (x0, x1, z0, z1), in the order of x."""
+    """A wall along x from 0, between y = 0 and `thick`, made of boxes around holes (x0, x1, z0, z1), in the order of x."""
     parts, x = [], 0.0
     for x0, x1, z0, z1 in holes:
         parts.append(box((x, x0), (0, thick), (0, height), cells=(6, 1, 6)))

@@ -3,9 +3,9 @@ from math import cos, pi, sin, sqrt
 
 
 class Part:
-    """A mesh. kind is what a person would call it: "solid" (what is behind its faces is inside), "room" (the same, of
-    a mesh whose faces look inwards) "sheet" (nothing is behind it) or "hollow" (a vessel or pipe of one wall: either is right). true_faces are the faces before some of them were
-    flipped by mistake."""
+    """A mesh. kind is what a person would call it: "solid" (closed), "room" (solid, but its faces look inwards), "sheet" (nothing
+    is behind it) or "hollow" (a vessel or pipe of one wall: solid and sheet are both right). true_faces are the faces before some
+    of them were flipped by mistake."""
 
     def __init__(self, vertices=(), faces=(), kind="solid", smooth=False):
         self.vertices, self.faces, self.kind, self.smooth = list(vertices), [tuple(f) for f in faces], kind, smooth
@@ -20,7 +20,7 @@ class Part:
         return self
 
     def moved(self, x=0.0, y=0.0, z=0.0, turn=0.0, tilt=0.0):
-        """Tilted about x, turned about z, then moved."""
+        """Tilts it about x, turns it about z, then moves it."""
         c, s, ct, st = cos(turn), sin(turn), cos(tilt), sin(tilt)
         moved = []
         for a, b, d in self.vertices:
@@ -34,7 +34,7 @@ class Part:
         return self
 
     def without(self, unwanted):
-        """Without the faces whose centre is unwanted."""
+        """Removes the faces whose centre is unwanted."""
         def centre(f):
             return [sum(self.vertices[i][k] for i in f) / len(f) for k in range(3)]
         self.faces = self.true_faces = [f for f in self.faces if not unwanted(*centre(f))]

@@ -42,7 +42,7 @@ def shade_smooth(mesh, below):
 
 
 def tiling_uvs(mesh):
-    """The first set, as a texture that repeats each metre has it: it overlaps itself and leaves the square."""
+    """The first set of UVs, for a texture that repeats each metre: it overlaps itself and leaves the square."""
     layer = mesh.uv_layers.new(name="UVMap")
     for polygon in mesh.polygons:
         drop = max(range(3), key=lambda k: abs(polygon.normal[k]))
