@@ -46,7 +46,7 @@ typedef struct vsh_compare_options {
     size_t struct_size;
     double step;   /* a texel is lost or gained if it differs by this from all values nearby, > 0 … 1 */
     int32_t reach; /* texels along each axis that count as nearby, 0 … 16 */
-    double noise;  /* standard error that sampling makes between the two, 0 … 1; limits allow for it */
+    double noise;  /* standard error that sampling makes between the two, 0 … 1; measures allow for it */
 } vsh_compare_options;
 
 static inline vsh_compare_options vsh_compare_options_default(void) {

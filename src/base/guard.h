@@ -17,7 +17,8 @@ struct Failure {
     vsh_error error{};
 };
 
-// Calls a C function and throws its error. The error is its last parameter, which callers here leave out.
+// Calls a C function, and throws its error if it fails. The error is its last parameter, which callers here
+// leave out.
 template <typename Function, typename... Arguments>
 void require(Function *function, const Arguments &...arguments) {
     Failure failure;

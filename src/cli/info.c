@@ -207,7 +207,7 @@ static void state_grid(json_t *grids, const vsh_vdb_entry *g) {
     }
     if (strstr(g->attributes, "vdbshade_version") != NULL && !is_level_set) {
         state(grid, "baked", json_true(),
-              "  holds: values that vdbshade baked, to be looked up: it is no caster and needs to be none\n");
+              "  holds: values that vdbshade baked, for lookups; it is not a caster\n");
     } else if (g->problem[0] != '\0') {
         complain(grid, "  ", g->mended != 0 ? "note" : "problem", "%s%s", g->problem,
                  g->mended != 0 ? ": its distances are made anew where it is used" : "");

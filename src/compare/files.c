@@ -469,7 +469,7 @@ static vsh_result compare_kinds(const files *f, const vsh_vdb_entry *golden, con
     if (!*comparable) {
         return add_problem(
             f, error,
-            "grid '%s': other voxels: golden's are %g × %g × %g, new ones %g × %g × %g, or stand elsewhere",
+            "grid '%s': other voxels: golden's are %g × %g × %g, new ones %g × %g × %g, or placed elsewhere",
             golden->name, golden->voxel_size[0], golden->voxel_size[1], golden->voxel_size[2],
             fresh->voxel_size[0], fresh->voxel_size[1], fresh->voxel_size[2]);
     }

@@ -72,7 +72,7 @@ static vsh_result check_arrays(const vsh_mesh *mesh, size_t index, vsh_error *er
 vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *error) {
     VSHI_TRY(check_arrays(mesh, index, error));
     if (is_loose(mesh)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: strides and 16-bit indices are not taken here",
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: strides and 16-bit indices are not supported here",
                          vshi_mesh_label(mesh, index).text);
     }
     VSHI_TRY(vshi_mesh_check_transform(mesh, index, error));
@@ -82,7 +82,7 @@ vsh_result vshi_mesh_validate(const vsh_mesh *mesh, size_t index, vsh_error *err
             return vshi_fail(error, VSH_ERROR_INPUT, "%s: vertex %zu of %zu lies at (%g, %g, %g)%s",
                              vshi_mesh_label(mesh, index).text, v, mesh->vertex_count, local.x, local.y,
                              local.z,
-                             vshi_finite(local) ? ", which the transform takes beyond every number"
+                             vshi_finite(local) ? ", which the transform moves beyond the range of numbers"
                                                 : ", expected finite numbers");
         }
     }

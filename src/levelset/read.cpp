@@ -223,7 +223,7 @@ vshi_decoder *Answer::ask(int32_t kind, const char *path, const std::function<vo
 
 void end_request(vshi_decoder *request, const char *path) {
     if (!vshi_decoder_ends(request)) {
-        refuse(VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
+        refuse(VSH_ERROR_INTERNAL, "%s: the request to its reader is bad", path);
     }
 }
 

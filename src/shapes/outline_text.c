@@ -258,7 +258,7 @@ vsh_result vshi_serve_text(const char *path, vshi_decoder *request, const vsh_ru
     options.line_spacing = vshi_decode_number(request);
     options.align = (int32_t)vshi_decode_count(request, VSH_ALIGN_RIGHT);
     if (text == NULL || !vshi_decoder_ends(request)) {
-        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader does not hold", path);
+        return vshi_fail(error, VSH_ERROR_INTERNAL, "%s: the request to its reader is bad", path);
     }
     vshi_contours contours = {.run = run, .error = error};
     vsh_result result;

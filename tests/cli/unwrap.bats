@@ -239,7 +239,7 @@ scattered() {
 
 @test "an OBJ output refuses --view, and replaces no foreign .mtl" {
     printf 'newmtl red\n' >lit.mtl
-    refuses 2 'lit.mtl: would be replaced, which vdbshade has not written' -- bake bare.obj "${LIGHT[@]}" -o lit.obj
+    refuses 2 'lit.mtl: it exists, and vdbshade did not write it' -- bake bare.obj "${LIGHT[@]}" -o lit.obj
     [ "$(cat lit.mtl)" = 'newmtl red' ] && [ ! -e lit.obj ] && [ ! -e lit.preview.png ] || fail "$(ls)"
     rm lit.mtl
     refuses 2 "--view 'lit.html': shows the light of a .glb" -- bake bare.obj "${LIGHT[@]}" -o lit.obj --view lit.html

@@ -230,7 +230,7 @@ LIST
 2 'again.exr: two outputs' | "${SMALL[@]}" -o again.exr --view again.exr
 3 nowhere | "${SMALL[@]}" -o again.exr --view nowhere/page.html
 2 'one lightmap of one mesh' | "${SMALL[@]}" --per-object -o objects/ --view page.html
-2 "--view 'page.html': an image does not hold the UVs that are made" | --ao 1 --unwrap always -o unwrapped.png --view page.html
+2 "--view 'page.html': an image cannot store the new UVs" | --ao 1 --unwrap always -o unwrapped.png --view page.html
 LIST
     untouched page.html
 }

@@ -187,7 +187,7 @@ static int check_view(const cli_bake_settings *s, const vsh_scene *scene) {
                   "--view '%s': shows one lightmap of one mesh; 'vdbshade view' shows others", s->view);
     CLI_REFUSE_IF(!asset && (receiver->unwrap == VSH_RECEIVER_UNWRAP_AUTO ||
                              receiver->unwrap == VSH_RECEIVER_UNWRAP_ALWAYS),
-                  "--view '%s': an image does not hold the UVs that are made; bake a .glb", s->view);
+                  "--view '%s': an image cannot store the new UVs; bake a .glb", s->view);
     return cli_has_ending(receiver->output, "obj")
                ? cli_usage("--view '%s': shows the light of a .glb, a .gltf or an image, not of an .obj",
                            s->view)

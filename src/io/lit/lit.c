@@ -140,8 +140,8 @@ static vsh_result check_images(const vsh_lit_options *options, vsh_error *error)
         const char *name = options->page_names[i];
         if (name != NULL && !is_file_name(name)) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                             "vsh_lit_options.page_names[%zu]: is no UTF-8, has a character that names of "
-                             "files have not, or is empty or longer than %d bytes",
+                             "vsh_lit_options.page_names[%zu]: is not UTF-8, has a character that file "
+                             "names cannot have, or is empty or longer than %d bytes",
                              i, VSHI_LIT_NAME_BYTES);
         }
     }

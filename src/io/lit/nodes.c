@@ -28,9 +28,8 @@ typedef struct uses {
 /* --- uses of meshes */
 
 static vsh_result fail_entry(const vshi_lit_work *work, size_t entry, vsh_error *error) {
-    return vshi_gltf_fail(
-        &work->gltf, error,
-        "mesh %zu of the model is none of its nodes': the file has changed since it was read", entry);
+    return vshi_gltf_fail(&work->gltf, error,
+                          "no node has mesh %zu of the model: the file has changed since it was read", entry);
 }
 
 static vsh_result check_entry(const vshi_lit_work *work, size_t entry, const use *u, vsh_error *error) {

@@ -630,8 +630,7 @@ static vsh_result check_mtl(const char *path, vsh_error *error) {
     return count == 0 || strcmp(begins, FIRST_LINE) == 0
                ? VSH_OK
                : vshi_fail(error, VSH_ERROR_ARGUMENT,
-                           "%s: would be replaced, which vdbshade has not written: give the OBJ another name",
-                           path);
+                           "%s: it exists, and vdbshade did not write it: give the OBJ another name", path);
 }
 
 /* --- files */

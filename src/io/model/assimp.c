@@ -195,8 +195,9 @@ static vsh_result add_bone(const assimp *source, const struct aiBone *bone, size
 static vsh_result check_moved(const assimp *source, const vshi_model_shape *shape, vsh_error *error) {
     for (size_t v = 0; v < shape->vertex_count; ++v) {
         if (!vshi_finite(vshi_vec_off(shape->positions + 3 * v))) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s: bones move vertex %zu of %zu beyond every number",
-                             source->path, v, shape->vertex_count);
+            return vshi_fail(error, VSH_ERROR_INPUT,
+                             "%s: bones move vertex %zu of %zu beyond the range of numbers", source->path, v,
+                             shape->vertex_count);
         }
     }
     return VSH_OK;
