@@ -127,7 +127,7 @@ static void lay_out(const estimating *s, block *b) {
     float spread = 0.0f;
     for (size_t k = 0; k < TEXELS; ++k) {
         const size_t i = b->at[k] - 1;
-        if (b->at[k] == 0 || s->shots->rays[i] == 0 || /* 0 rays: a part of the bake is damaged */
+        if (b->at[k] == 0 || s->shots->rays[i] == 0 || /* or the value of a damaged part */
             !(s->shots->own.ao[i] >= 0.0f && s->shots->own.ao[i] <= 1.0f)) {
             b->at[k] = 0;
             continue;
