@@ -18,8 +18,8 @@ double vshi_srgb_to_linear(double encoded);
 typedef struct vshi_image_writer vshi_image_writer;
 
 /* Begins the file that vsh_image_write() would write: the same bytes, for the same values. Ignores
- * image->planes, and copies names. Errors: the same, and VSH_ERROR_ARGUMENT if `writer` is NULL. End with
- * vshi_image_writer_finish() or vshi_image_writer_abandon(). */
+ * image->planes; image->names must outlive the writer. Errors: the same, and VSH_ERROR_ARGUMENT if `writer`
+ * is NULL. End with vshi_image_writer_finish() or vshi_image_writer_abandon(). */
 vsh_result vshi_image_writer_create(const char *path, const vsh_image *image,
                                     const vsh_image_options *options, vshi_image_writer **writer,
                                     vsh_error *error);

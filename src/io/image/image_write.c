@@ -491,7 +491,7 @@ struct vshi_image_writer {
     write_plan plan;
     vshi_output output;
     char *path;
-    char (*names)[VSH_CHANNEL_NAME]; /* of the image's channels */
+    const char *const *names; /* [channel_count]: the image's */
     int32_t channel_count;
     int32_t row; /* next */
     void *file;  /* the codec's */
@@ -503,27 +503,8 @@ static void free_writer(vshi_image_writer *writer) {
         return;
     }
     vshi_output_abandon(&writer->output);
-    free(writer->names);
     free(writer->path);
     free(writer);
-}
-
-static vsh_result copy_texts(vshi_image_writer *writer, const char *path, const vsh_image *image,
-                             vsh_error *error) {
-    VSHI_TRY(VSHI_ALLOCATE(writer->names, (size_t)image->channel_count, path, error));
-    VSHI_TRY(vshi_copy_text(&writer->path, path, path, error));
-    writer->channel_count = image->channel_count;
-    for (int32_t c = 0; c < image->channel_count; ++c) {
-        strcpy(writer->names[c], image->names[c]); /* check_image() checked the lengths */
-    }
-    for (int32_t p = 0; p < writer->plan.planes.count; ++p) {
-        vshi_image_plane *plane = &writer->plan.planes.planes[p];
-        const int32_t channel = writer->plan.channel[p];
-        if (channel >= 0 && plane->name == image->names[channel]) {
-            plane->name = writer->names[channel];
-        }
-    }
-    return VSH_OK;
 }
 
 /* `whole`: the image is in memory, so it has at most VSHI_MAX_VALUES. */
@@ -536,7 +517,9 @@ static vsh_result create(const char *path, const vsh_image *image, const vsh_ima
     if (whole) {
         VSHI_TRY_DONE(vshi_check_values(path, image->width, image->height, image->channel_count, error));
     }
-    VSHI_TRY_DONE(copy_texts(made, path, image, error));
+    made->names = image->names;
+    made->channel_count = image->channel_count;
+    VSHI_TRY_DONE(vshi_copy_text(&made->path, path, path, error));
     VSHI_TRY_DONE(vshi_output_begin(&made->output, path, error));
     const write_plan *plan = &made->plan;
     VSHI_TRY_DONE(plan->codec->begin(made->output.temporary, made->path, &plan->format, &plan->planes,
