@@ -172,39 +172,25 @@ static vsh_result parse_pack(const char *text, const vsh_image *image, pack made
     }
 }
 
-/* Writes the default packing as text. R, G and B hold the irradiance, or else the first three channels; a
- * single channel fills all three. A holds "A". It is left out where the format has no alpha. */
-static void write_default_pack(const vsh_image *image, char *text, size_t capacity) {
-    const char *colors[3] = {NULL, NULL, NULL};
-    const char *alpha = NULL;
-    int count = 0;
+/* Fills the default pack. R, G and B hold the irradiance, or else the first three channels; a single channel
+ * fills all three. A holds "A". */
+static void fill_default_pack(const vsh_image *image, pack made) {
+    int32_t channels[KEYS] = {-1, -1, -1, -1}, count = 0;
     for (int32_t c = 0; c < image->channel_count; ++c) {
-        if (strcmp(image->names[c], "A") == 0) {
-            alpha = image->names[c];
+        if (strcmp(image->names[c], keys[ALPHA]) == 0) {
+            channels[ALPHA] = c;
         } else if (count < 3) {
-            colors[count++] = image->names[c];
+            channels[count++] = c;
         }
     }
     picture found;
     if (find_picture(image, &found) && found.rgb[0] >= 0 && found.rgb[0] != found.rgb[1]) { /* irradiance */
-        for (int c = 0; c < 3; ++c) {
-            colors[c] = image->names[found.rgb[c]];
-        }
-        count = 3;
+        memcpy(channels, found.rgb, sizeof found.rgb);
+    } else if (count <= 1) { /* grey; coverage if there is no other channel */
+        channels[0] = channels[1] = channels[2] = count == 1 ? channels[0] : channels[ALPHA];
     }
-    if (count <= 1) {
-        /* a single channel is shown in grey; coverage if there is no other */
-        const char *only = count == 1 ? colors[0] : alpha;
-        colors[0] = colors[1] = colors[2] = only;
-    }
-    const char *const values[KEYS] = {colors[0], colors[1], colors[2], alpha};
-    size_t used = 0;
-    for (int key = 0; key < KEYS && used < capacity; ++key) {
-        if (values[key] != NULL) {
-            const int written = snprintf(text + used, capacity - used, "%s%s=%s", used > 0 ? "," : "",
-                                         keys[key], values[key]);
-            used += written > 0 ? (size_t)written : 0;
-        }
+    for (int key = 0; key < KEYS; ++key) {
+        made[key] = (pack_entry){.given = channels[key] >= 0, .channel = channels[key]};
     }
 }
 
@@ -323,19 +309,6 @@ static vsh_result plan_bits(const char *path, int32_t bits, write_plan *plan, vs
                      (has & VSHI_BITS_32) != 0 ? " 32" : "");
 }
 
-/* Removes the keys that the format lacks from a pack. Fails if the caller asked for one. */
-static vsh_result fit_pack(const char *path, const vshi_format *format, bool asked, pack entries,
-                           vsh_error *error) {
-    if (!format->alpha && entries[ALPHA].given) {
-        if (asked) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: A is given, but %s has no alpha", path,
-                             format->name);
-        }
-        entries[ALPHA].given = false;
-    }
-    return VSH_OK;
-}
-
 static void add_plane(write_plan *plan, int32_t channel, vshi_image_plane plane) {
     plan->channel[plan->planes.count] = channel;
     plan->planes.planes[plan->planes.count++] = plane;
@@ -374,11 +347,17 @@ static vsh_result plan_picture(const char *path, const vsh_image *image, write_p
 
 static vsh_result plan_pack(const char *path, const vsh_image *image, const char *text, write_plan *plan,
                             vsh_error *error) {
-    char default_text[KEYS * (VSH_CHANNEL_NAME + 3)];
     pack made = {{0}};
-    write_default_pack(image, default_text, sizeof default_text);
-    VSHI_TRY(parse_pack(text != NULL ? text : default_text, image, made, error));
-    VSHI_TRY(fit_pack(path, &plan->format, text != NULL, made, error));
+    if (text == NULL) {
+        fill_default_pack(image, made);
+        made[ALPHA].given &= plan->format.alpha;
+    } else {
+        VSHI_TRY(parse_pack(text, image, made, error));
+    }
+    if (made[ALPHA].given && !plan->format.alpha) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: pack: A is given, but %s has no alpha", path,
+                         plan->format.name);
+    }
     for (int key = 0; key < KEYS; ++key) {
         const pack_entry *entry = &made[key];
         /* formats other than EXR always have R, G and B: by default 0 */
