@@ -3,6 +3,7 @@
 #define _GNU_SOURCE /* fopencookie */
 #include "view/page.h"
 
+#include "base/elementary.h"
 #include "base/file.h"
 #include "base/floats.h"
 #include "base/job.h"
@@ -245,7 +246,7 @@ static void split_bytes(const float *values, int32_t width, int32_t height, bool
     for (int32_t y = 0; y < height; ++y) {
         unsigned last_high = 0, last_low = 0;
         for (int32_t x = 0; x < width; ++x) {
-            const float given = *values++, value = srgb ? (float)vshi_srgb_to_linear(given) : given;
+            const float given = *values++, value = srgb ? (float)vshi_from_srgb(given) : given;
             const unsigned half =
                 imath_float_to_half(isnan(value) ? value : fminf(fmaxf(value, -MOST), MOST));
             *high++ = (uint8_t)((half >> 8) - last_high);

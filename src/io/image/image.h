@@ -10,9 +10,6 @@
 
 VSH_BEGIN_C
 
-/* Takes the sRGB curve off a value of 0 … 1. */
-double vshi_srgb_to_linear(double encoded);
-
 /* An image that is written as its rows come, so that it need not be in memory at once. One thread at a time.
  */
 typedef struct vshi_image_writer vshi_image_writer;

@@ -398,10 +398,6 @@ static vsh_result plan_planes(const char *path, const vsh_image *image, const ch
 
 /* --- color spaces */
 
-double vshi_srgb_to_linear(double encoded) {
-    return vshi_from_srgb(encoded);
-}
-
 static float encode_srgb(float value) {
     return (float)vshi_to_srgb((double)value);
 }
