@@ -35,10 +35,6 @@ typedef struct page {
     bool refused;  /* memory for the JSON was refused */
 } page;
 
-static vsh_result fail_memory(const page *p, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", p->path);
-}
-
 /* --- blocks of data, as base64 */
 
 static void begin_block(page *p) {
@@ -82,7 +78,7 @@ static const char *find_file_name(const char *path) {
 
 static vsh_result begin_job(const page *p, size_t total, vshi_job **job, vsh_error *error) {
     *job = vshi_job_begin(p->run, "page", total);
-    return *job != NULL ? VSH_OK : fail_memory(p, error);
+    return *job != NULL ? VSH_OK : vshi_fail_memory(error, p->path);
 }
 
 /* Advances a job, unless an earlier write failed. */
@@ -107,8 +103,8 @@ static vsh_result add_triangles(page *p, const char *path, const vsh_model *mode
     VSHI_TRY(begin_job(p, vsh_model_mesh_count(model), &job, error));
     begin_block(p);
     FILE *to = fopencookie(p, "w", (cookie_io_functions_t){.write = write_to_block});
-    vsh_result result =
-        to != NULL ? vshi_lit_write_model(model, path, p->run, job, to, error) : fail_memory(p, error);
+    vsh_result result = to != NULL ? vshi_lit_write_model(model, path, p->run, job, to, error)
+                                   : vshi_fail_memory(error, p->path);
     if (to != NULL) {
         fclose(to);
     }
@@ -175,7 +171,7 @@ static vsh_result add_named(page *p, vshi_gltf *gltf, const char *uri, json_t *f
     vsh_error why;
     vsh_result result = VSH_OK;
     if (path == NULL) {
-        return fail_memory(p, error);
+        return vshi_fail_memory(error, p->path);
     }
     if (!p->run->allow_outside && !vshi_input_is_beside(gltf->path, path)) {
         vshi_warn(p->run, "%s: '%s' is outside of its folder and not in the page; --allow-outside reads it",
@@ -292,8 +288,8 @@ static vsh_result add_channels(page *p, const source *from, json_t *channels, vs
         if (!picture || !made_of_others) {
             uLongf packed_size = room;
             split_bytes(image->planes[c], image->width, image->height, picture && srgb, bytes);
-            VSHI_TRY_DONE(compress(packed, &packed_size, bytes, size) == Z_OK ? VSH_OK
-                                                                              : fail_memory(p, error));
+            const bool done = compress(packed, &packed_size, bytes, size) == Z_OK;
+            VSHI_TRY_DONE(done ? VSH_OK : vshi_fail_memory(error, p->path));
             begin_block(p);
             write_data(p, packed, packed_size);
             end_block(p);
@@ -322,7 +318,7 @@ static vsh_result add_image(page *p, const source *from, double held, json_t *pa
                  json_pack("[o, o]", vshi_lit_text(from->attributes[i].name),
                            vshi_lit_text(from->attributes[i].value)));
     }
-    return p->refused ? fail_memory(p, error) : add_channels(p, from, channels, error);
+    return p->refused ? vshi_fail_memory(error, p->path) : add_channels(p, from, channels, error);
 }
 
 static vsh_result add_image_file(page *p, const char *path, json_t *pages, vsh_error *error) {
@@ -352,7 +348,7 @@ static vsh_result add_bake(page *p, const vsh_view_bake *bake, const vshi_view_s
     describe(p, about, "uvSet", json_integer(surface != NULL ? -1 : bake->uv_set));
     describe(p, about, "pages", pages);
     if (p->refused) {
-        return fail_memory(p, error);
+        return vshi_fail_memory(error, p->path);
     }
     if (surface != NULL) {
         const source from = {.name = name, .image = *surface->image};
@@ -417,7 +413,7 @@ static int write_escaped(const char *text, size_t size, void *user) {
 static vsh_result write_scripts(page *p, vsh_error *error) {
     fputs("<script type=\"application/json\" id=\"about\">", p->to);
     if (p->refused || json_dump_callback(p->about, write_escaped, p, JSON_COMPACT) != 0) {
-        return fail_memory(p, error);
+        return vshi_fail_memory(error, p->path);
     }
     fputs("</script>\n", p->to);
     for (const vshi_embedded *script = vshi_view_scripts; script->size > 0; ++script) {
@@ -436,7 +432,7 @@ vsh_result vshi_view_write_page(const char *path, const vsh_view_bake *bakes, si
     p.to = p.file.to;
     p.about = json_array();
     vsh_result result;
-    VSHI_TRY_DONE(p.about != NULL ? VSH_OK : fail_memory(&p, error));
+    VSHI_TRY_DONE(p.about != NULL ? VSH_OK : vshi_fail_memory(error, p.path));
     write_head(&p);
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY_DONE(add_bake(&p, &bakes[i], NULL, error));

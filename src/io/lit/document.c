@@ -53,13 +53,13 @@ vsh_result vshi_lit_open(vshi_lit_work *work, vsh_error *error) {
     json_t *images = json_object_get(work->gltf.root, "images");
     work->own_images = json_copy(images);
     return images != NULL && json_array_size(work->own_images) != json_array_size(images)
-               ? vshi_lit_fail_memory(work, error)
+               ? vshi_fail_memory(error, work->gltf.path)
                : VSH_OK;
 }
 
 vsh_result vshi_lit_begin(vshi_lit_work *work, vsh_error *error) {
     work->gltf.root = json_pack("{s:{s:s}}", "asset", "version", "2.0");
-    return work->gltf.root != NULL ? VSH_OK : vshi_lit_fail_memory(work, error);
+    return work->gltf.root != NULL ? VSH_OK : vshi_fail_memory(error, work->gltf.path);
 }
 
 void vshi_lit_work_free(vshi_lit_work *work) {
@@ -80,10 +80,6 @@ void vshi_lit_work_free(vshi_lit_work *work) {
     vshi_gltf_free_buffers(&work->gltf);
     json_decref(work->gltf.root);
     free(work->text);
-}
-
-vsh_result vshi_lit_fail_memory(const vshi_lit_work *work, vsh_error *error) {
-    return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", work->gltf.path);
 }
 
 vsh_result vshi_lit_allocate(vshi_lit_work *work, const vshi_array *arrays, size_t count, vsh_error *error) {
@@ -141,7 +137,7 @@ vsh_result vshi_lit_find_object(vshi_lit_work *work, json_t *object, const char 
         *member = json_object();
         vshi_lit_set(work, object, key, *member);
     }
-    return *member == NULL || work->refused ? vshi_lit_fail_memory(work, error)
+    return *member == NULL || work->refused ? vshi_fail_memory(error, work->gltf.path)
            : json_is_object(*member)        ? VSH_OK
                                             : vshi_gltf_fail(&work->gltf, error, "a '%s' is no object", key);
 }
@@ -223,7 +219,7 @@ static vsh_result grow_added(vshi_lit_work *work, size_t more, vsh_error *error)
         VSHI_TRY(vshi_gltf_hold(&work->gltf, (double)(room - work->added.room), error));
         unsigned char *grown = realloc(work->added.list, room);
         if (grown == NULL) {
-            return vshi_lit_fail_memory(work, error);
+            return vshi_fail_memory(error, work->gltf.path);
         }
         work->added.list = grown;
         work->added.room = room;
@@ -238,7 +234,7 @@ vsh_result vshi_lit_add_view(vshi_lit_work *work, const void *bytes, size_t size
     enum { ALIGNMENT = 8 }; /* glTF needs 4; buffers that follow keep their alignment by 8 */
     size_t padded;
     if (__builtin_add_overflow(size, ALIGNMENT - 1, &padded)) {
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     const size_t at = work->added.count;
     VSHI_TRY(grow_added(work, padded / ALIGNMENT * ALIGNMENT, error));
@@ -254,7 +250,7 @@ vsh_result vshi_lit_add_view(vshi_lit_work *work, const void *bytes, size_t size
     if (target != 0) {
         vshi_lit_set_number(work, made, "target", (size_t)target);
     }
-    return work->refused ? vshi_lit_fail_memory(work, error) : VSH_OK;
+    return work->refused ? vshi_fail_memory(error, work->gltf.path) : VSH_OK;
 }
 
 static json_t *make_number(double value, int type) {
@@ -293,7 +289,7 @@ vsh_result vshi_lit_add_floats(vshi_lit_work *work, const float *values, size_t 
     const size_t stride = (size_t)components * sizeof *values;
     size_t size, view = 0;
     if (__builtin_mul_overflow(count, stride, &size)) {
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     VSHI_TRY(vshi_lit_add_view(work, values, size, VSHI_LIT_VERTICES, 0, &view, error));
     json_t *made = append_accessor(work, view, VSHI_GLTF_FLOAT, count, components, accessor);
@@ -312,7 +308,7 @@ vsh_result vshi_lit_add_colors(vshi_lit_work *work, const void *values, size_t c
                                vsh_error *error) {
     size_t size, view = 0;
     if (__builtin_mul_overflow(count, (size_t)VSHI_LIT_COLOR_BYTES, &size)) {
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     VSHI_TRY(vshi_lit_add_view(work, values, size, VSHI_LIT_VERTICES, 0, &view, error));
     json_t *made = append_accessor(work, view, VSHI_GLTF_USHORT, count, 4, accessor);
@@ -328,7 +324,7 @@ vsh_result vshi_lit_add_indices(vshi_lit_work *work, const uint32_t *indices, si
     const size_t offset = work->added.count;
     size_t size, view = 0;
     if (__builtin_mul_overflow(count, shorts ? sizeof(uint16_t) : sizeof(uint32_t), &size)) {
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     VSHI_TRY(vshi_lit_add_view(work, shorts ? NULL : indices, size, VSHI_LIT_INDICES, 0, &view, error));
     for (size_t i = 0; shorts && i < count; ++i) {

@@ -140,7 +140,8 @@ vsh_result vshi_serve_draco(const char *path, vshi_decoder *request, const vsh_r
     (void)request;
     vshi_lit_work work = {.gltf = {.path = path, .run = run, .job = vshi_job_begin(run, "load", 1)}};
     vsh_result result;
-    VSHI_TRY_DONE(work.gltf.job != NULL ? vshi_lit_open(&work, error) : vshi_lit_fail_memory(&work, error));
+    VSHI_TRY_DONE(work.gltf.job != NULL ? vshi_lit_open(&work, error)
+                                        : vshi_fail_memory(error, work.gltf.path));
     VSHI_TRY_DONE(list_places(&work, error));
     VSHI_TRY_DONE(decode_all(&work, error));
     vshi_encode_count(payload, work.dracos.count);

@@ -303,7 +303,8 @@ static vsh_result write_all(vshi_lit_work *work, vsh_error *error) {
         VSHI_TRY_DONE(vshi_lit_bring_images(work, error)); /* fewer, once pruned */
         VSHI_TRY_DONE(add_origin(work, error));
     }
-    result = work->refused ? vshi_lit_fail_memory(work, error) : vshi_lit_write_files(work, &besides, error);
+    result = work->refused ? vshi_fail_memory(error, work->gltf.path)
+                           : vshi_lit_write_files(work, &besides, error);
 done:
     vshi_lit_besides_free(&besides);
     return result;

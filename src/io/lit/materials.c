@@ -191,7 +191,7 @@ static vsh_result bring_image(vshi_lit_work *work, json_t *image, const char *ur
     vsh_error why;
     char *path = vshi_uri_path(work->gltf.path, uri);
     if (path == NULL) {
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     vsh_result result = read_image(work, path, &bytes, &size, &why);
     const char *type = result == VSH_OK ? find_type(bytes, size, path) : NULL;
@@ -230,7 +230,7 @@ vsh_result vshi_lit_bring_images(vshi_lit_work *work, vsh_error *error) {
             VSHI_TRY(bring_image(work, image, uri, error));
         }
     }
-    return known ? VSH_OK : vshi_lit_fail_memory(work, error);
+    return known ? VSH_OK : vshi_fail_memory(error, work->gltf.path);
 }
 
 /* --- looks of primitives */
@@ -411,7 +411,7 @@ static vsh_result make_material(vshi_lit_work *work, vshi_lit_look *look, bool *
             : vshi_gltf_fail(&work->gltf, error, "materials[%zu] is no object", look->material);
     if (result != VSH_OK) {
         json_decref(material);
-        return work->refused || material == NULL ? vshi_lit_fail_memory(work, error) : result;
+        return work->refused || material == NULL ? vshi_fail_memory(error, work->gltf.path) : result;
     }
     if (look->material != SIZE_MAX && !taken[look->material]) {
         taken[look->material] = true;

@@ -179,8 +179,11 @@ static size_t count_sets(const json_t *attributes) {
     return set;
 }
 
-vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
-                               const char *where, size_t *set, vsh_error *error) {
+/* Finds the set for new UVs of `mesh`, and removes it from the primitive: VSHI_LIT_SET, or a later one of
+ * textures that are replaced, if no remaining texture uses it; else a new one. Errors: VSH_ERROR_LIMIT
+ * (VSH_MAX_UV_SETS). */
+static vsh_result choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
+                             const char *where, size_t *set, vsh_error *error) {
     const uint32_t purposes = find_purposes(work, mesh);
     json_t *attributes = json_object_get(primitive, "attributes");
     const size_t count = count_sets(attributes);
@@ -362,7 +365,7 @@ static vsh_result copy_elements(const primitive *p, size_t index, const vshi_glt
     const size_t offset = work->added.count;
     size_t bytes, view;
     if (__builtin_mul_overflow(count, stride, &bytes)) {
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     VSHI_TRY(
         vshi_lit_add_view(work, NULL, bytes, VSHI_LIT_VERTICES, stride != size ? stride : 0, &view, error));
@@ -596,7 +599,7 @@ static vsh_result make_new(primitive *p, json_t *list, vsh_error *error) {
     vshi_lit_work *work = p->work;
     char name[SET_NAME];
     size_t uvs, set, split = 0, whole = SIZE_MAX;
-    VSHI_TRY(vshi_lit_choose_set(work, p->made, p->lit, p->where, &set, error));
+    VSHI_TRY(choose_set(work, p->made, p->lit, p->where, &set, error));
     if (set > VSHI_LIT_SET) {
         vshi_warn(work->gltf.run,
                   "%s: %s: textures that stay use TEXCOORD_%d, so the lightmap's UVs are TEXCOORD_%zu, which "
@@ -658,7 +661,7 @@ vsh_result vshi_lit_make_primitive(vshi_lit_work *work, size_t mesh, size_t inde
     p.given =
         json_array_get(json_object_get(vshi_gltf_element(&work->gltf, "meshes", mesh), "primitives"), index);
     p.made = vshi_lit_copy_json(work, p.given);
-    VSHI_TRY_DONE(work->refused ? vshi_lit_fail_memory(work, error) : VSH_OK);
+    VSHI_TRY_DONE(work->refused ? vshi_fail_memory(error, work->gltf.path) : VSH_OK);
     if (p.lit->uvs == NULL) {
         result = p.lit->colors != NULL ? make_colored(&p, list, error) : make_kept(&p, list, error);
         goto done;

@@ -24,10 +24,6 @@ json_t *vshi_lit_mark_texture(const char *purpose) {
 
 /* --- references */
 
-static json_t *find_extension(const json_t *object, const char *name) {
-    return json_object_get(json_object_get(object, "extensions"), name);
-}
-
 /* Keeps the item of a list that `object` refers to by `key` or, once there are new numbers, sets its number.
  */
 static void refer(pruning *p, json_t *object, const char *key, int kind) {
@@ -69,7 +65,7 @@ static void refer_primitive(pruning *p, json_t *primitive) {
     json_t *target;
     refer_accessors(p, json_object_get(primitive, "attributes"));
     refer(p, primitive, "indices", ACCESSORS);
-    refer(p, find_extension(primitive, "KHR_draco_mesh_compression"), "bufferView", VIEWS);
+    refer(p, vshi_gltf_extension(primitive, "KHR_draco_mesh_compression"), "bufferView", VIEWS);
     json_array_foreach(json_object_get(primitive, "targets"), i, target) {
         refer_accessors(p, target);
     }
@@ -85,7 +81,8 @@ static void refer_roots(pruning *p) {
         }
     }
     json_array_foreach(json_object_get(root, "nodes"), i, item) {
-        refer_accessors(p, json_object_get(find_extension(item, "EXT_mesh_gpu_instancing"), "attributes"));
+        refer_accessors(p,
+                        json_object_get(vshi_gltf_extension(item, "EXT_mesh_gpu_instancing"), "attributes"));
     }
     json_array_foreach(json_object_get(root, "skins"), i, item) {
         refer(p, item, "inverseBindMatrices", ACCESSORS);

@@ -136,9 +136,6 @@ vsh_result vshi_lit_begin(vshi_lit_work *work, vsh_error *error);
 /* Frees everything that the work owns. */
 void vshi_lit_work_free(vshi_lit_work *work);
 
-/* VSH_ERROR_MEMORY. */
-vsh_result vshi_lit_fail_memory(const vshi_lit_work *work, vsh_error *error);
-
 /* Allocates arrays within the memory limit, as VSHI_ALLOCATE_BLOCK() does: free() of the first one frees
  * them. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_lit_allocate(vshi_lit_work *work, const vshi_array *arrays, size_t count, vsh_error *error);
@@ -294,12 +291,6 @@ vsh_result vshi_lit_make_primitive(vshi_lit_work *work, size_t mesh, size_t prim
 
 /* Whether two atlases have split a mesh into the same vertices and triangles. */
 bool vshi_lit_is_split_alike(const vsh_lit_mesh *a, const vsh_lit_mesh *b);
-
-/* Finds the set for new UVs of `mesh`, and removes it from the primitive: VSHI_LIT_SET, or a later one of
- * textures that are replaced, if no remaining texture uses it; else a new one. Errors: VSH_ERROR_LIMIT
- * (VSH_MAX_UV_SETS). */
-vsh_result vshi_lit_choose_set(const vshi_lit_work *work, json_t *primitive, const vsh_lit_mesh *mesh,
-                               const char *where, size_t *set, vsh_error *error);
 
 /* Corners of a mesh's triangles, and its set of UVs. */
 typedef struct vshi_lit_corners {

@@ -89,7 +89,7 @@ vsh_result vshi_lit_check_replaced(const vshi_lit_work *work, const char *path, 
             }
             char *given = vshi_uri_path(work->gltf.path, uri);
             if (given == NULL) {
-                return vshi_lit_fail_memory(work, error);
+                return vshi_fail_memory(error, work->gltf.path);
             }
             const bool same = vshi_lit_is_same_file(given, path);
             free(given);
@@ -127,7 +127,7 @@ vsh_result vshi_lit_name_beside(const vshi_lit_work *work, const char *mark, con
         if (path == NULL) {
             free(*name);
             *name = NULL;
-            return vshi_lit_fail_memory(work, error);
+            return vshi_fail_memory(error, work->gltf.path);
         }
         const vsh_result result = vshi_lit_check_replaced(work, path, error);
         free(path);
@@ -322,7 +322,7 @@ static vsh_result join_buffers(writing *w, vsh_error *error) {
     if (work->refused) { /* the list may not hold the buffer */
         json_decref(list);
         free(numbers);
-        return vshi_lit_fail_memory(work, error);
+        return vshi_fail_memory(error, work->gltf.path);
     }
     for (size_t i = 0; i < w->part_count; ++i) {
         move_part(w, w->parts[i], numbers, list);
@@ -343,7 +343,7 @@ static vsh_result join_buffers(writing *w, vsh_error *error) {
     }
     vshi_lit_drop_extension(work, "EXT_meshopt_compression");
     vshi_lit_drop_extension(work, "KHR_meshopt_compression");
-    return work->refused ? vshi_lit_fail_memory(work, error) : VSH_OK;
+    return work->refused ? vshi_fail_memory(error, work->gltf.path) : VSH_OK;
 }
 
 /* --- a glTF */
@@ -414,16 +414,16 @@ static vsh_result write_document(const writing *w, bool binary, FILE *to, vsh_er
     size_t size = 0;
     FILE *text = binary ? open_memstream(&json, &size) : to;
     if (text == NULL) {
-        return vshi_lit_fail_memory(w->work, error);
+        return vshi_fail_memory(error, w->work->gltf.path);
     }
     bool failed =
         json_dump_callback(w->work->gltf.root, write_text, text, binary ? JSON_COMPACT : JSON_INDENT(2)) != 0;
     if (!binary) {
         fputc('\n', to);
-        return failed ? vshi_lit_fail_memory(w->work, error) : VSH_OK;
+        return failed ? vshi_fail_memory(error, w->work->gltf.path) : VSH_OK;
     }
     failed = failed || ferror(text) != 0;
-    const vsh_result result = fclose(text) != 0 || failed ? vshi_lit_fail_memory(w->work, error)
+    const vsh_result result = fclose(text) != 0 || failed ? vshi_fail_memory(error, w->work->gltf.path)
                                                           : write_chunks(w, json, size, to, error);
     free(json);
     return result;
@@ -649,7 +649,7 @@ static vsh_result name_files(writing *w, vsh_error *error) {
         w->paths[i] = path;
         w->outputs[i] = &w->files[i].output;
         if (path == NULL) {
-            return vshi_lit_fail_memory(w->work, error);
+            return vshi_fail_memory(error, w->work->gltf.path);
         }
         VSHI_TRY(vshi_lit_check_replaced(w->work, path, error));
         if (i == w->besides->count && i < named && vshi_lit_is_obj(w->work->output)) {

@@ -83,7 +83,7 @@ bool vshi_gltf_numbers(const json_t *object, const char *key, size_t count, doub
     return true;
 }
 
-const json_t *vshi_gltf_extension(const json_t *object, const char *name) {
+json_t *vshi_gltf_extension(const json_t *object, const char *name) {
     return json_object_get(json_object_get(object, "extensions"), name);
 }
 

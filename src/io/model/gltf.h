@@ -61,7 +61,7 @@ vsh_result vshi_gltf_index(const vshi_gltf *gltf, const json_t *object, const ch
 bool vshi_gltf_numbers(const json_t *object, const char *key, size_t count, double *values);
 
 /* Returns the object of an extension, or NULL. */
-const json_t *vshi_gltf_extension(const json_t *object, const char *name);
+json_t *vshi_gltf_extension(const json_t *object, const char *name);
 
 /* Whether an extension's name is `pattern`, or begins with it if that ends in "_". */
 bool vshi_gltf_is_named(const char *name, const char *pattern);
