@@ -173,10 +173,11 @@ static int add_conditional(scmp_filter_ctx filter) {
     return failed;
 }
 
-/* The kernel filters every thread or none, also those that libraries have begun before main: a filtered
- * thread could write to the stack of one without a filter. Calls of other machines (32 bit, x32) end the
- * process, not only a thread that others may wait for. */
-bool vshi_confine_calls(void) {
+/* Allows only the system calls that parsing needs; others fail with EPERM. Returns false if the system allows
+ * no filter, and in a sanitized build. The kernel filters every thread or none, also those that libraries
+ * have begun before main: a filtered thread could write to the stack of one without a filter. Calls of other
+ * machines (32 bit, x32) end the process, not only a thread that others may wait for. */
+static bool confine_calls(void) {
     const scmp_filter_ctx filter = VSHI_SANITIZED ? NULL : seccomp_init(SCMP_ACT_ERRNO(EPERM));
     if (filter == NULL) {
         return false;
@@ -370,7 +371,7 @@ static void confine(const vshi_request *request, bool files, vshi_reader_state *
     if (confine_files(request, false) && files) {
         state->confined |= VSH_CONFINED_FILES;
     }
-    if (vshi_confine_calls()) {
+    if (confine_calls()) {
         state->confined |= VSH_CONFINED_CALLS;
     }
 }

@@ -55,11 +55,6 @@ const char *vshi_missing_text(uint64_t confined, char text[VSHI_MISSING_TEXT]);
  * in a sanitized build. */
 bool vshi_confine_resources(uint64_t memory, uint64_t base, double seconds);
 
-/* Allows only the system calls that parsing needs, in all present and later threads. Other calls fail with
- * EPERM, and calls of other machines (32 bit, x32) end the process. Returns false if the system allows no
- * filter, and in a sanitized build. */
-bool vshi_confine_calls(void);
-
 /* Counts the tasks (threads) of this process; 0 without /proc. */
 int vshi_task_count(void);
 
