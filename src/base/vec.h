@@ -19,6 +19,16 @@ static inline vshi_vec vshi_vec_of(const double v[3]) {
 static inline vshi_vec vshi_vec_off(const float v[3]) {
     return (vshi_vec){v[0], v[1], v[2]};
 }
+static inline void vshi_vec_to_floats(vshi_vec v, float to[3]) {
+    to[0] = (float)v.x;
+    to[1] = (float)v.y;
+    to[2] = (float)v.z;
+}
+static inline void vshi_vec_to_doubles(vshi_vec v, double to[3]) {
+    to[0] = v.x;
+    to[1] = v.y;
+    to[2] = v.z;
+}
 static inline vshi_vec vshi_add(vshi_vec a, vshi_vec b) {
     return (vshi_vec){a.x + b.x, a.y + b.y, a.z + b.z};
 }

@@ -382,9 +382,7 @@ static void find_ball(const volume_bake *bake, size_t block, double centre[3], d
     for (int i = 0; i < 8; ++i) {
         *radius = fmax(*radius, vshi_length(vshi_sub(vshi_vec_of(corner[i]), middle)));
     }
-    centre[0] = middle.x;
-    centre[1] = middle.y;
-    centre[2] = middle.z;
+    vshi_vec_to_doubles(middle, centre);
 }
 
 /* Finds facts by balls around the blocks, in free space. */

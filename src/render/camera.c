@@ -80,10 +80,6 @@ static view_axes find_axes(const vsh_camera *camera, double azimuth, double elev
     return axes;
 }
 
-static void set(double to[3], vshi_vec v) {
-    to[0] = v.x, to[1] = v.y, to[2] = v.z;
-}
-
 /* Resolves and checks a camera that is about to be placed, and finds its axes. */
 static vsh_result begin_frame(const vsh_camera *camera, double azimuth, double elevation, double aspect,
                               vsh_camera *full, view_axes *axes, vsh_error *error) {
@@ -137,8 +133,8 @@ vsh_result vsh_camera_frame_points(vsh_camera *camera, size_t count, const doubl
              near + 0.01 * size);
     const vshi_vec middle = vshi_add(vshi_scale(axes.across, 0.5 * (high[0] - low[0])),
                                      vshi_scale(axes.over, 0.5 * (high[1] - low[1])));
-    set(camera->position, vshi_add(middle, vshi_scale(axes.back, away)));
-    set(camera->target, vshi_add(middle, vshi_scale(axes.back, 0.5 * (near + far))));
+    vshi_vec_to_doubles(vshi_add(middle, vshi_scale(axes.back, away)), camera->position);
+    vshi_vec_to_doubles(vshi_add(middle, vshi_scale(axes.back, 0.5 * (near + far))), camera->target);
     return VSH_OK;
 }
 
@@ -166,8 +162,8 @@ vsh_result vsh_camera_frame(vsh_camera *camera, const double bounds_min[3], cons
         away = fmax(away, vshi_dot(c, axes.back) + fmax(tall, wide) / tangent);
     }
     const vshi_vec middle = vshi_add(low, vshi_scale(size, 0.5));
-    set(camera->position, vshi_add(middle, vshi_scale(axes.back, away)));
-    set(camera->target, middle);
+    vshi_vec_to_doubles(vshi_add(middle, vshi_scale(axes.back, away)), camera->position);
+    vshi_vec_to_doubles(middle, camera->target);
     return VSH_OK;
 }
 
@@ -186,6 +182,6 @@ vsh_result vsh_camera_orbit(vsh_camera *camera, double angle, vsh_error *error) 
     const double c = vshi_cos(angle), s = vshi_sin(angle);
     const vshi_vec turned = vshi_add(vshi_add(vshi_scale(arm, c), vshi_scale(vshi_cross(axis, arm), s)),
                                      vshi_scale(axis, vshi_dot(axis, arm) * (1.0 - c)));
-    set(camera->position, vshi_add(target, turned));
+    vshi_vec_to_doubles(vshi_add(target, turned), camera->position);
     return VSH_OK;
 }

@@ -72,14 +72,6 @@ typedef struct rendering {
     vsh_shade_stats *stats;          /* [tiles of the band] */
 } rendering;
 
-static void store(vshi_vec v, double to[3]) {
-    to[0] = v.x, to[1] = v.y, to[2] = v.z;
-}
-
-static void store_float(vshi_vec v, float to[3]) {
-    to[0] = (float)v.x, to[1] = (float)v.y, to[2] = (float)v.z;
-}
-
 /* Clips a ray's interval *begin … *end to a box; false if nothing is left. */
 static bool clip_to_box(vshi_vec origin, vshi_vec direction, vshi_vec low, vshi_vec high, double *begin,
                         double *end) {
@@ -128,7 +120,7 @@ static double resolved(const march *m, int32_t level) {
 static double sample_distance(march *m, double t) {
     const vshi_vec at = vshi_add(m->origin, vshi_scale(m->direction, t));
     float p[3];
-    store_float(at, p);
+    vshi_vec_to_floats(at, p);
     double h = sample(m, m->level, p);
     if (fabs(h) >= resolved(m, m->level)) {
         while (fabs(h) >= resolved(m, m->level) && m->level + 1 < m->field->level_count) {
@@ -215,7 +207,7 @@ static vshi_vec find_normal(const vsh_field *field, vshi_vec position, vshi_vec 
     const double world[3] = {position.x, position.y, position.z};
     float p[3];
     double slope[3];
-    store_float(vshi_to_field(field, world), p);
+    vshi_vec_to_floats(vshi_to_field(field, world), p);
     for (int axis = 0; axis < 3; ++axis) {
         float low[3] = {p[0], p[1], p[2]}, high[3] = {p[0], p[1], p[2]};
         low[axis] -= STENCIL;
@@ -275,10 +267,10 @@ static void add_point(hits *h, const vshi_lift_point *point, vshi_vec marched, c
     h->seen[i] = result;
     h->color[i] = color;
     h->points[i] = *point;
-    store(point->foot, h->traced[i]);
-    store(marched, h->marched[i]);
-    store_float(point->normal, h->normals[i]);
-    store_float(point->face, h->faces[i]);
+    vshi_vec_to_doubles(point->foot, h->traced[i]);
+    vshi_vec_to_doubles(marched, h->marched[i]);
+    vshi_vec_to_floats(point->normal, h->normals[i]);
+    vshi_vec_to_floats(point->face, h->faces[i]);
     h->texels[i] = texel;
     memcpy(result->normal, h->normals[i], sizeof result->normal);
 }
@@ -301,8 +293,8 @@ static double find_clearance(const vsh_field *field, vshi_vec at, vshi_vec norma
     while (clearance < MOST_CLEAR) {
         double world[3];
         float p[3];
-        store(vshi_add(at, vshi_scale(normal, clearance * field->voxel_size)), world);
-        store_float(vshi_to_field(field, world), p);
+        vshi_vec_to_doubles(vshi_add(at, vshi_scale(normal, clearance * field->voxel_size)), world);
+        vshi_vec_to_floats(vshi_to_field(field, world), p);
         const double h = (double)vshi_field_distance(field, p);
         if (h >= LEAST_CLEAR) {
             return clearance;
@@ -339,7 +331,7 @@ static vsh_result light_hits(const rendering *r, hits *h, vsh_shade_stats *stats
         const vshi_lifter lifter = vshi_lifter_open(r->occluders, &r->lights[l]);
         for (size_t i = 0; i < h->count; ++i) {
             const vshi_vec from = vshi_vec_of(r->traces_shadow ? h->traced[i] : h->marched[i]);
-            store(vshi_add(from, vshi_lift_find(&lifter, &h->points[i])), h->lifted[i]);
+            vshi_vec_to_doubles(vshi_add(from, vshi_lift_find(&lifter, &h->points[i])), h->lifted[i]);
         }
         output.visibility = visibility;
         VSHI_TRY(vsh_query_points(r->query, &points, NULL, &r->run, &output, stats, error));
@@ -391,7 +383,7 @@ static vsh_result light_step(const rendering *r, step *s, vsh_shade_stats *stats
         for (size_t i = 0; i < s->count; ++i) {
             vshi_vec to;
             vshi_light_towards(&place, vshi_vec_of(s->positions[i]), &to);
-            store_float(to, s->towards[i]);
+            vshi_vec_to_floats(to, s->towards[i]);
         }
         vsh_shade_irradiance(&points, &s->towards[0][0], light, s->visibility, &s->light[0][0]);
     }
@@ -424,8 +416,9 @@ static __attribute__((noinline)) vsh_result add_fog(const rendering *r, size_t c
         for (size_t j = 0; j < passing; ++j) {
             const size_t i = in[j];
             const double stretch = length[i] / steps, along = (k + jitter[i]) * stretch;
-            store(vshi_add(rays[i].ray.origin, vshi_scale(rays[i].ray.direction, begin[i] + along)),
-                  s.positions[j]);
+            vshi_vec_to_doubles(
+                vshi_add(rays[i].ray.origin, vshi_scale(rays[i].ray.direction, begin[i] + along)),
+                s.positions[j]);
             s.share[j] = vshi_exp(-f->extinction * along) * f->extinction * stretch;
         }
         VSHI_TRY(light_step(r, &s, stats, error));
@@ -603,7 +596,7 @@ static void end_picture(const rendering *r) {
     const size_t pixels = (size_t)r->grid.width * (size_t)r->grid.height;
     for (size_t i = 0; picture->normal != NULL && i < pixels; ++i) {
         float *normal = picture->normal + 3 * i;
-        store_float(vshi_unit(vshi_vec_off(normal)), normal);
+        vshi_vec_to_floats(vshi_unit(vshi_vec_off(normal)), normal);
     }
     for (size_t i = 0; picture->alpha != NULL && i < pixels; ++i) {
         const float alpha = picture->alpha[i]; /* sums of weights round */

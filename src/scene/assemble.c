@@ -88,10 +88,7 @@ static vsh_result place_sdf(const vsh_caster *caster, placed_sdf *placed, vsh_er
     double rotation[4];
     vshi_similarity_rotation(m, scale, rotation);
     vshi_quaternion_multiply(rotation, root->rotation, root->rotation);
-    const vshi_vec t = vshi_transform_point(m, vshi_vec_of(root->translation));
-    root->translation[0] = t.x;
-    root->translation[1] = t.y;
-    root->translation[2] = t.z;
+    vshi_vec_to_doubles(vshi_transform_point(m, vshi_vec_of(root->translation)), root->translation);
     root->scale *= scale;
     return VSH_OK;
 }

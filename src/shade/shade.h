@@ -11,18 +11,6 @@
 
 /* --- small helpers */
 
-static inline void vshi_vec_to_floats(vshi_vec v, float to[3]) {
-    to[0] = (float)v.x;
-    to[1] = (float)v.y;
-    to[2] = (float)v.z;
-}
-
-static inline void vshi_vec_to_doubles(vshi_vec v, double to[3]) {
-    to[0] = v.x;
-    to[1] = v.y;
-    to[2] = v.z;
-}
-
 /* Signed distance at a point of field space, voxels. */
 static inline double vshi_distance_at(const vsh_field *field, vshi_vec p) {
     const float at[3] = {(float)p.x, (float)p.y, (float)p.z};

@@ -202,10 +202,7 @@ static void place(vshi_spheres *made, const double *spheres, const double *trans
     vshi_spheres_info *info = &made->info;
     for (size_t i = 0; i < info->count; ++i) {
         double *s = made->sphere[i];
-        const vshi_vec p = vshi_transform_point(transform, vshi_vec_of(spheres + 4 * i));
-        s[0] = p.x;
-        s[1] = p.y;
-        s[2] = p.z;
+        vshi_vec_to_doubles(vshi_transform_point(transform, vshi_vec_of(spheres + 4 * i)), s);
         s[3] = scale * spheres[4 * i + 3];
     }
     find_box(made->sphere, (part){0, info->count}, 1.0, info->bounds_min, info->bounds_max);

@@ -67,9 +67,7 @@ static bool aim_ray(const vshi_truth *truth, const target *t, const double disc[
             vshi_add(vshi_scale(t->u, scale * place[0]), vshi_scale(t->v, scale * place[1]));
         d = vshi_dome_mirror(vshi_add(across, vshi_scale(t->axis, up)), t->mirror);
     }
-    ray->direction[0] = d.x;
-    ray->direction[1] = d.y;
-    ray->direction[2] = d.z;
+    vshi_vec_to_doubles(d, ray->direction);
     return normal == NULL || vshi_dot(d, *normal) > 0.0;
 }
 

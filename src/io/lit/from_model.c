@@ -67,12 +67,7 @@ static void copy_positions(const vsh_mesh *mesh, const vsh_lit_mesh *lit, const 
                            float *values) {
     for (size_t v = 0; v < count_vertices(mesh, lit); ++v) {
         const float *from = mesh->positions + 3 * find_source(lit, v);
-        memcpy(values + 3 * v, from, sizeof(float[3]));
-        if (world != NULL) {
-            const vshi_vec p = vshi_transform_point(world, vshi_vec_off(from));
-            const float moved[3] = {(float)p.x, (float)p.y, (float)p.z};
-            memcpy(values + 3 * v, moved, sizeof moved);
-        }
+        vshi_vec_to_floats(vshi_transform_point(world, vshi_vec_off(from)), values + 3 * v);
     }
 }
 
@@ -102,10 +97,9 @@ static vsh_result copy_normals(maker *m, const vsh_mesh *mesh, const vsh_lit_mes
         const size_t source = find_source(lit, v);
         const vshi_vec given = vshi_vec_off(mesh->normals + 3 * source);
         vshi_vec n = vshi_length(given) > 0.0 ? given : flat[source];
-        n = world != NULL ? vshi_transform_normal(world, n) : n;
+        n = vshi_transform_normal(world, n);
         n = vshi_length(n) > 0.0 ? vshi_unit(n) : (vshi_vec){0.0, 1.0, 0.0};
-        const float unit[3] = {(float)n.x, (float)n.y, (float)n.z};
-        memcpy(values + 3 * v, unit, sizeof unit);
+        vshi_vec_to_floats(n, values + 3 * v);
     }
     free(flat);
     return VSH_OK;

@@ -125,12 +125,6 @@ void vshi_model_blend_add(vshi_model_blend *blend, double weight, const double m
     }
 }
 
-static void store_vector(vshi_vec v, float *to) {
-    to[0] = (float)v.x;
-    to[1] = (float)v.y;
-    to[2] = (float)v.z;
-}
-
 void vshi_model_blend_move(vshi_model_shape *shape, const vshi_model_blend *blends, const double rest[12]) {
     for (size_t v = 0; v < shape->vertex_count; ++v) {
         double m[12];
@@ -138,10 +132,10 @@ void vshi_model_blend_move(vshi_model_shape *shape, const vshi_model_blend *blen
             m[k] = blends[v].sum > 0.0 ? blends[v].matrix[k] / blends[v].sum : rest[k];
         }
         float *p = shape->positions + 3 * v;
-        store_vector(vshi_transform_point(m, vshi_vec_off(p)), p);
+        vshi_vec_to_floats(vshi_transform_point(m, vshi_vec_off(p)), p);
         if (shape->normals != NULL) {
             float *n = shape->normals + 3 * v;
-            store_vector(vshi_unit(vshi_transform_normal(m, vshi_vec_off(n))), n);
+            vshi_vec_to_floats(vshi_unit(vshi_transform_normal(m, vshi_vec_off(n))), n);
         }
     }
 }
