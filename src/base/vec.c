@@ -12,6 +12,20 @@ static const double SIMILARITY_TOLERANCE = 1e-4;
  * mostly rounding. */
 static const double FLATTENING_VOLUME = 1e-12;
 
+const double vshi_identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+
+void vshi_transform_compose(const double outer[12], const double inner[12], double result[12]) {
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 4; ++column) {
+            double sum = column == 3 ? outer[4 * row + 3] : 0.0;
+            for (int k = 0; k < 3; ++k) {
+                sum += outer[4 * row + k] * inner[4 * k + column];
+            }
+            result[4 * row + column] = sum;
+        }
+    }
+}
+
 double vshi_similarity_scale(const double m[12]) {
     const vshi_vec x = {m[0], m[4], m[8]};
     const vshi_vec y = {m[1], m[5], m[9]};

@@ -94,6 +94,8 @@ static inline void vshi_frame(vshi_vec n, vshi_vec *tangent, vshi_vec *bitangent
     *bitangent = (vshi_vec){b, sign + n.y * n.y * a, -n.y};
 }
 
+extern const double vshi_identity[12];
+
 /* Point through a transform [12] of three rows of four; NULL is the identity. */
 static inline vshi_vec vshi_transform_point(const double *m, vshi_vec p) {
     if (m == NULL) {
@@ -138,6 +140,9 @@ static inline vshi_vec vshi_transform_normal(const double *m, vshi_vec n) {
                 (m[0] * m[5] - m[1] * m[4]) * n.z),
     };
 }
+
+/* result = outer × inner; `result` must be neither. */
+void vshi_transform_compose(const double outer[12], const double inner[12], double result[12]);
 
 /* Uniform scale of a transform [12]; 0 for one that shears, scales unevenly or flattens. */
 double vshi_similarity_scale(const double m[12]);

@@ -1,6 +1,7 @@
 /* vdbshade render: pictures of a scene, to look at what bake makes of it. */
 #include "bake/bake.h"
 #include "base/memory.h"
+#include "base/vec.h"
 
 enum { MOST_LIGHTMAPS = 64 };
 
@@ -337,20 +338,14 @@ static const double azimuth = 35.0 * CLI_DEGREE, elevation = 25.0 * CLI_DEGREE;
 
 /* Adds the vertices that the mesh's triangles use, in the world. */
 static void add_vertices(const vsh_mesh *mesh, double *points, size_t *count) {
-    static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
-    const double *t = mesh->transform != NULL ? mesh->transform : identity;
     bool *used = calloc(mesh->vertex_count + 1, sizeof *used);
     for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
         used[mesh->indices[i]] = true;
     }
     for (size_t v = 0; v < mesh->vertex_count; ++v) {
-        const float *p = mesh->positions + 3 * v;
-        double *to = points + 3 * *count;
-        for (int row = 0; row < 3; ++row) {
-            to[row] = t[4 * row] * (double)p[0] + t[4 * row + 1] * (double)p[1] +
-                      t[4 * row + 2] * (double)p[2] + t[4 * row + 3];
-        }
-        *count += used[v] && isfinite(to[0]) && isfinite(to[1]) && isfinite(to[2]);
+        const vshi_vec at = vshi_transform_point(mesh->transform, vshi_vec_off(mesh->positions + 3 * v));
+        vshi_vec_to_doubles(at, points + 3 * *count);
+        *count += used[v] && vshi_finite(at);
     }
     free(used);
 }

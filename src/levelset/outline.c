@@ -41,7 +41,6 @@ vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness, c
                                  const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                  vsh_error *error) {
     VSHI_FLOATS;
-    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
     VSHI_MAKES(grid);
     VSHI_NEEDS(outline);
     if (!(thickness > 0.0 && thickness <= VSHI_OUTLINE_LARGEST)) {
@@ -49,7 +48,7 @@ vsh_result vsh_grid_from_outline(const vsh_outline *outline, double thickness, c
                          "outline: thickness %.9g: expected more than 0, at most %g", thickness,
                          VSHI_OUTLINE_LARGEST);
     }
-    const double *m = transform != NULL ? transform : identity;
+    const double *m = transform != NULL ? transform : vshi_identity;
     extrusion e = {.outline = outline, .scale = vshi_similarity_scale(m), .half = 0.5 * thickness};
     if (!(e.scale > 0.0)) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT,

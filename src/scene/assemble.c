@@ -408,13 +408,12 @@ static void add_sdf(traced *t, vsh_sdf sdf, const double transform[12]) {
 }
 
 static void add_balls(traced *t, const vshi_spheres *spheres) {
-    static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     for (size_t i = 0; i < spheres->info.count; ++i) {
         vsh_sdf_node *ball = &t->balls[t->ball_count++];
         *ball = vsh_sdf_node_default();
         memcpy(ball->translation, spheres->sphere[i], sizeof ball->translation);
         ball->radius = spheres->sphere[i][3];
-        add_sdf(t, (vsh_sdf){ball, 1}, identity);
+        add_sdf(t, (vsh_sdf){ball, 1}, vshi_identity);
     }
 }
 

@@ -4,6 +4,7 @@
 #include "base/floats.h"
 #include "base/job.h"
 #include "base/memory.h"
+#include "base/vec.h"
 #include "io/model/model.h"
 #include "shade/occluders.h"
 
@@ -115,7 +116,7 @@ static void place_plane(const plane *p, double transform[12]) {
     };
     double before[12];
     memcpy(before, transform, sizeof before);
-    vshi_model_compose(before, turned, transform);
+    vshi_transform_compose(before, turned, transform);
 }
 
 /* Reads the plane after the other keys: it comes before the transform. */

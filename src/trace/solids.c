@@ -54,19 +54,6 @@ static void invert(const double *m, double inverse[12]) {
     inverse[11] = -moved.z;
 }
 
-/* outer × inner, both of three rows of four. */
-static void compose(const double outer[12], const double inner[12], double result[12]) {
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 4; ++column) {
-            double sum = column == 3 ? outer[4 * row + 3] : 0.0;
-            for (int k = 0; k < 3; ++k) {
-                sum += outer[4 * row + k] * inner[4 * k + column];
-            }
-            result[4 * row + column] = sum;
-        }
-    }
-}
-
 /* The transform of a node. */
 static void node_transform(const vsh_sdf_node *node, double m[12]) {
     const double *q = node->rotation;
@@ -95,7 +82,7 @@ static void add_members(vshi_solids *solids, const vsh_sdf_node *nodes, int32_t 
     if (node->shape == VSH_SDF_UNION) {
         double own[12], below[12];
         node_transform(node, own);
-        compose(transform, own, below);
+        vshi_transform_compose(transform, own, below);
         add_members(solids, nodes, node->left, below);
         add_members(solids, nodes, node->right, below);
         return;
@@ -150,7 +137,6 @@ vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, siz
     VSHI_FLOATS;
     VSHI_MAKES(solids);
     VSHI_NEEDS_OF(count, sdfs);
-    static const double identity[12] = {1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0};
     size_t nodes;
     vshi_solids *made;
     vsh_result result;
@@ -160,7 +146,7 @@ vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, siz
     VSHI_TRY_DONE(vshi_allocate((void **)&made->members, nodes, sizeof *made->members, "solids", error));
     empty_box(made->low, made->high);
     for (size_t i = 0; i < count; ++i) {
-        const double *transform = transforms != NULL ? transforms + 12 * i : identity;
+        const double *transform = transforms != NULL ? transforms + 12 * i : vshi_identity;
         VSHI_TRY_DONE(add_tree(made, &sdfs[i], transform, error));
     }
     made->size = made->low[0] <= made->high[0]

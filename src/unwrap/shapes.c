@@ -4,6 +4,7 @@
 
 #include "base/memory.h"
 #include "base/parallel.h"
+#include "base/vec.h"
 #include "geometry/edges.h"
 #include "geometry/mesh.h"
 
@@ -26,8 +27,7 @@ enum {
 /* Returns a transform's size, the root of the sum of its axes' squares. `gram`: dot products of the axes over
  * the sum of their squares, equal for transforms that differ by a similarity. */
 static double measure_transform(const double *m, double gram[6]) {
-    static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-    m = m != NULL ? m : identity;
+    m = m != NULL ? m : vshi_identity;
     double most = 0.0, squares = 0.0;
     for (int i = 0; i < 12; ++i) { /* no square leaves the range of doubles */
         most = i % 4 != 3 && fabs(m[i]) > most ? fabs(m[i]) : most;

@@ -26,8 +26,6 @@ typedef struct maker {
     size_t count, list_count;
 } maker;
 
-static const double identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
-
 /* --- transforms */
 
 /* Nodes of glTF turn, scale and mirror, but do not shear (3.5.3). */
@@ -252,7 +250,7 @@ static vsh_result add_node(maker *m, size_t first, size_t end, json_t *nodes, vs
     if (label != NULL || errno == ENOMEM) {
         vshi_lit_set(work, made, "name", label);
     }
-    if (!sheared && memcmp(of->transform, identity, sizeof identity) != 0) {
+    if (!sheared && memcmp(of->transform, vshi_identity, sizeof vshi_identity) != 0) {
         double columns[16] = {[15] = 1.0};
         for (int i = 0; i < 16; ++i) {
             columns[i] = i % 4 < 3 ? of->transform[4 * (i % 4) + i / 4] : columns[i];
@@ -267,7 +265,7 @@ static vsh_result add_all(maker *m, json_t *nodes, vsh_error *error) {
     for (size_t first = 0, end; first < m->count; first = end) {
         const vsh_mesh *of = &m->meshes[first];
         for (end = first + 1; end < m->count && of->object != 0 && m->meshes[end].object == of->object &&
-                              memcmp(m->meshes[end].transform, of->transform, sizeof identity) == 0;) {
+                              memcmp(m->meshes[end].transform, of->transform, sizeof vshi_identity) == 0;) {
             ++end;
         }
         VSHI_TRY(vshi_job_advance(gltf->job, end - first) ? vshi_job_fail_cancelled(gltf->job, error)

@@ -152,7 +152,7 @@ static void copy_rows(const struct aiMatrix4x4 *m, double rows[12]) {
 static void find_node_world(const double parent[12], const struct aiNode *node, double world[12]) {
     double own[12];
     copy_rows(&node->mTransformation, own);
-    vshi_model_compose(parent, own, world);
+    vshi_transform_compose(parent, own, world);
 }
 
 /* Finds the world transform of the first node with a name, at or below `node`. */
@@ -180,7 +180,7 @@ static vsh_result add_bone(const assimp *source, const struct aiBone *bone, size
         return vshi_fail(error, VSH_ERROR_INPUT, "%s: bone '%s' is no node", path, bone->mName.data);
     }
     copy_rows(&bone->mOffsetMatrix, offset);
-    vshi_model_compose(world, offset, moved);
+    vshi_transform_compose(world, offset, moved);
     for (unsigned i = 0; i < bone->mNumWeights; ++i) {
         const struct aiVertexWeight given = bone->mWeights[i];
         if (given.mVertexId >= vertex_count || !isfinite(given.mWeight)) {

@@ -484,7 +484,7 @@ static vsh_result read_joints(vshi_gltf *gltf, size_t skin, double (**joints)[12
             bind[k] =
                 inverse != NULL ? (double)inverse[16 * i + (size_t)(4 * (k % 4) + k / 4)] : vshi_identity[k];
         }
-        vshi_model_compose(gltf->node_world[(size_t)node], bind, (*joints)[i]);
+        vshi_transform_compose(gltf->node_world[(size_t)node], bind, (*joints)[i]);
     }
 done:
     free(inverse);
@@ -613,7 +613,7 @@ static vsh_result add_instances(vshi_gltf *gltf, size_t node, size_t mesh, size_
             }
         }
         compose_parts(t, r, s, own);
-        vshi_model_compose(gltf->node_world[node], own, world);
+        vshi_transform_compose(gltf->node_world[node], own, world);
         VSHI_TRY_DONE(vshi_job_check(gltf->job, error));
         VSHI_TRY_DONE(add_entries(gltf, node, mesh, first, i + 1, world, error));
     }
@@ -672,7 +672,7 @@ static vsh_result visit(vshi_gltf *gltf, const json_t *nodes, const double paren
         if (!read_transform(given, own)) {
             return vshi_gltf_fail(gltf, error, "nodes[%zu]: its transform is no list of numbers", node);
         }
-        vshi_model_compose(parent, own, gltf->node_world[node]);
+        vshi_transform_compose(parent, own, gltf->node_world[node]);
         VSHI_TRY(visit(gltf, json_object_get(given, "children"), gltf->node_world[node], depth + 1, error));
     }
     return VSH_OK;

@@ -18,7 +18,6 @@
 #include <strings.h>
 #include <sys/stat.h>
 
-const double vshi_identity[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
 const double vshi_uv_identity[6] = {1, 0, 0, 0, 1, 0};
 
 /* --- materials and images */
@@ -104,18 +103,6 @@ static vsh_result make_name(const char *first, const char *second, char **name, 
     snprintf(*name, size, "%s%s%s", first, both ? "/" : "", both || first[0] == '\0' ? second : "");
     make_line(*name);
     return VSH_OK;
-}
-
-void vshi_model_compose(const double parent[12], const double own[12], double world[12]) {
-    for (int row = 0; row < 3; ++row) {
-        for (int column = 0; column < 4; ++column) {
-            double sum = column == 3 ? parent[4 * row + 3] : 0.0;
-            for (int k = 0; k < 3; ++k) {
-                sum += parent[4 * row + k] * own[4 * k + column];
-            }
-            world[4 * row + column] = sum;
-        }
-    }
 }
 
 void vshi_model_blend_add(vshi_model_blend *blend, double weight, const double matrix[12]) {

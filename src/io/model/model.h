@@ -156,7 +156,7 @@ struct vsh_model {
     double unit; /* metres in a unit of the file; 0: not known */
 };
 
-extern const double vshi_identity[12], vshi_uv_identity[6];
+extern const double vshi_uv_identity[6];
 
 /* The place of a shape. */
 typedef struct vshi_model_place {
@@ -199,9 +199,6 @@ void vshi_model_blend_add(vshi_model_blend *blend, double weight, const double m
 
 /* Moves each vertex v by blends[v], divided by its sum of weights; vertices without weights by `rest`. */
 void vshi_model_blend_move(vshi_model_shape *shape, const vshi_model_blend *blends, const double rest[12]);
-
-/* world = parent × own. */
-void vshi_model_compose(const double parent[12], const double own[12], double world[12]);
 
 /* Parses a file in a reader, and encodes the answer. */
 vsh_result vshi_serve_model(const char *path, vshi_decoder *request, const vsh_run *run,

@@ -4,6 +4,7 @@
 
 #include "base/decimal.h"
 #include "base/memory.h"
+#include "base/vec.h"
 
 #include <math.h>
 #include <stdlib.h>

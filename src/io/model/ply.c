@@ -3,6 +3,7 @@
 #include "base/bytes.h"
 #include "base/decimal.h"
 #include "base/memory.h"
+#include "base/vec.h"
 #include "io/model/faces.h"
 #include "io/model/model.h"
 #include "io/model/text.h"
