@@ -193,12 +193,16 @@ vsh_result vshi_meshes_tighten(const vsh_mesh *meshes, size_t count, vshi_tight_
     return VSH_OK;
 }
 
-bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i) {
+vshi_vec vshi_mesh_face_normal(const vsh_mesh *mesh, size_t i) {
     const uint32_t *index = mesh->indices + 3 * i;
     const vshi_vec a = vshi_vec_off(mesh->positions + 3 * (size_t)index[0]);
     const vshi_vec b = vshi_vec_off(mesh->positions + 3 * (size_t)index[1]);
     const vshi_vec c = vshi_vec_off(mesh->positions + 3 * (size_t)index[2]);
-    const vshi_vec normal = vshi_cross(vshi_sub(b, a), vshi_sub(c, a));
+    return vshi_cross(vshi_sub(b, a), vshi_sub(c, a));
+}
+
+bool vshi_mesh_degenerate(const vsh_mesh *mesh, size_t i) {
+    const vshi_vec normal = vshi_mesh_face_normal(mesh, i);
     return normal.x == 0.0 && normal.y == 0.0 && normal.z == 0.0;
 }
 

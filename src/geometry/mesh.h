@@ -81,6 +81,9 @@ static inline void vshi_mesh_triangle(const vsh_mesh *mesh, size_t i, vshi_vec c
     vshi_mesh_triangle_of(mesh, i, corner, vertex);
 }
 
+/* Normal of triangle i without the transform, twice the area long. */
+vshi_vec vshi_mesh_face_normal(const vsh_mesh *mesh, size_t i);
+
 /* Whether triangle i has no area, so that all code skips it. Decides by local positions: products of
  * differences of floats are nearly always exact in double, so collinear corners give 0. After a rotation they
  * would give a rounding's worth of area. */

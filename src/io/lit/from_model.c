@@ -1,7 +1,7 @@
 /* A document made of a model of another format: a node for each object, and white materials. */
 #include "io/lit/work.h"
 
-#include "base/vec.h"
+#include "geometry/mesh.h"
 
 #include <errno.h>
 #include <math.h>
@@ -69,14 +69,6 @@ static void copy_positions(const vsh_mesh *mesh, const vsh_lit_mesh *lit, const 
     }
 }
 
-static vshi_vec find_flat_normal(const vsh_mesh *mesh, size_t triangle) {
-    const uint32_t *corner = mesh->indices + 3 * triangle;
-    const vshi_vec a = vshi_vec_off(mesh->positions + 3 * (size_t)corner[0]);
-    const vshi_vec b = vshi_vec_off(mesh->positions + 3 * (size_t)corner[1]);
-    const vshi_vec c = vshi_vec_off(mesh->positions + 3 * (size_t)corner[2]);
-    return vshi_cross(vshi_sub(b, a), vshi_sub(c, a));
-}
-
 /* A normal of length 0 becomes that of the triangles around the vertex, which is how it is shaded here. */
 static vsh_result copy_normals(maker *m, const vsh_mesh *mesh, const vsh_lit_mesh *lit, const double *world,
                                float *values, vsh_error *error) {
@@ -88,7 +80,7 @@ static vsh_result copy_normals(maker *m, const vsh_mesh *mesh, const vsh_lit_mes
     for (size_t i = 0; i < 3 * mesh->triangle_count; ++i) {
         const size_t v = mesh->indices[i];
         if (!(vshi_length(vshi_vec_off(mesh->normals + 3 * v)) > 0.0)) {
-            flat[v] = vshi_add(flat[v], find_flat_normal(mesh, i / 3));
+            flat[v] = vshi_add(flat[v], vshi_mesh_face_normal(mesh, i / 3));
         }
     }
     for (size_t v = 0; v < count_vertices(mesh, lit); ++v) {
