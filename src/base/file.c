@@ -5,7 +5,6 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>
-#include <limits.h>
 #include <nettle/sha2.h>
 #include <signal.h>
 #include <stdlib.h>
@@ -14,25 +13,24 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-static const char *last_part(const char *path) {
+const char *vshi_path_name(const char *path) {
     const char *slash = strrchr(path, '/');
     return slash != NULL ? slash + 1 : path;
 }
 
-/* Finds the folder of the path, or "." if the path names none. The system opens no path over PATH_MAX. */
-static void find_folder(const char *path, char folder[PATH_MAX]) {
-    const int length = (int)(last_part(path) - path);
+void vshi_path_folder(const char *path, char folder[PATH_MAX]) {
+    const int length = (int)(vshi_path_name(path) - path);
     snprintf(folder, PATH_MAX, "%.*s", length > 1 ? length - 1 : 1, length > 0 ? path : ".");
 }
 
 const char *vshi_path_ending(const char *path) {
-    const char *name = last_part(path);
+    const char *name = vshi_path_name(path);
     const char *dot = strrchr(name, '.');
     return dot != NULL && dot != name ? dot + 1 : "";
 }
 
 char *vshi_path_beside(const char *path, const char *name, size_t size) {
-    const size_t folder = (size_t)(last_part(path) - path);
+    const size_t folder = (size_t)(vshi_path_name(path) - path);
     char *text = malloc(folder + size + 1);
     if (text != NULL) {
         memcpy(text, path, folder);
@@ -52,7 +50,7 @@ enum {
 /* Writes the name of a temporary of this target: ".NAME.PID.tmp.ENDING", or ".NAME.PID-NUMBER.tmp.ENDING".
  * NAME is cut so that the system accepts the length. Returns the length of ".NAME.". */
 static size_t name_temporary(const char *target, long process, int number, char name[NAME_MAX + 1]) {
-    const char *stem = last_part(target), *ending = vshi_path_ending(target);
+    const char *stem = vshi_path_name(target), *ending = vshi_path_ending(target);
     const size_t dot = ending[0] != '\0', ending_length = strlen(ending);
     const size_t room =
         ending_length + TEMPORARY_ROOM < NAME_MAX ? NAME_MAX - ending_length - TEMPORARY_ROOM : 0;
@@ -85,7 +83,7 @@ static int create_temporary(const char *target, char *path, size_t capacity) {
     for (int number = 0; number < MAX_TEMPORARIES; ++number) {
         char name[NAME_MAX + 1];
         name_temporary(target, (long)getpid(), number, name);
-        snprintf(path, capacity, "%.*s%s", (int)(last_part(target) - target), target, name);
+        snprintf(path, capacity, "%.*s%s", (int)(vshi_path_name(target) - target), target, name);
         const int file = open(path, O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0666);
         if (file < 0 && errno != EEXIST) {
             return -1;
@@ -127,7 +125,7 @@ static bool is_leftover(int file, long process) {
  * Files of other users, and those that cannot be opened, stay. */
 static void clean_temporaries(const char *target) {
     char folder[PATH_MAX];
-    find_folder(target, folder);
+    vshi_path_folder(target, folder);
     DIR *listing = opendir(folder);
     if (listing == NULL) {
         return;
@@ -197,11 +195,11 @@ vsh_result vshi_output_check(const char *path, vsh_error *error) {
     if (path == NULL || path[0] == '\0') {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "output path: it is empty");
     }
-    if (last_part(path)[0] == '\0') {
+    if (vshi_path_name(path)[0] == '\0') {
         return fail_output(path, "it is a folder", error);
     }
     char folder[PATH_MAX];
-    find_folder(path, folder);
+    vshi_path_folder(path, folder);
     struct stat status;
     if (stat(folder, &status) != 0 || access(folder, W_OK | X_OK) != 0) {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: cannot be written: its folder: %s", path,
@@ -249,7 +247,7 @@ vsh_result vshi_output_begin(vshi_output *output, const char *path, vsh_error *e
  * is ignored, because some file systems cannot sync folders, and some folders cannot be read. */
 static vsh_result move_into_place(const char *temporary, const char *target, vsh_error *error) {
     char path[PATH_MAX];
-    find_folder(target, path);
+    vshi_path_folder(target, path);
     const int folder = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
     const vsh_result result =
         rename(temporary, target) == 0
@@ -446,7 +444,7 @@ bool vshi_input_is_beside(const char *model, const char *path) {
         }
     }
     char given[PATH_MAX];
-    find_folder(model, given);
+    vshi_path_folder(model, given);
     return realpath(given, folder) != NULL && lies_in(folder, file);
 }
 

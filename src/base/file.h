@@ -3,6 +3,7 @@
 
 #include "base/job.h"
 
+#include <limits.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <vdbshade/base.h>
@@ -16,6 +17,12 @@ typedef struct vshi_output {
     char *temporary; /* write here; NULL: no file is being written */
     int held;        /* 1 + a descriptor that tells other processes that this one lives; 0: none */
 } vshi_output;
+
+/* Returns the path's last part. Points into `path`. */
+VSHI_SHARED const char *vshi_path_name(const char *path);
+
+/* Copies the folder of the path, "." if the path names none. The system opens no path over PATH_MAX. */
+VSHI_SHARED void vshi_path_folder(const char *path, char folder[PATH_MAX]);
 
 /* Returns the text after the last dot of the path's last part, "exr", or "". Points into `path`. */
 VSHI_SHARED const char *vshi_path_ending(const char *path);

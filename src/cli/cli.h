@@ -126,9 +126,6 @@ const char *cli_keep_text(const char *format, ...) __attribute__((format(printf,
 /* Formats a number of bytes, "1.5 GiB"; likewise never freed. */
 const char *cli_bytes_text(uint64_t bytes);
 
-/* Returns the part of a path after its last slash. */
-const char *cli_file_name(const char *path);
-
 /* Whether a path ends in one of the endings "exr png …", in any case. */
 bool cli_has_ending(const char *path, const char *endings);
 

@@ -4,7 +4,6 @@
 #include "cli.h"
 
 #include <errno.h>
-#include <limits.h>
 #include <stdarg.h>
 #include <strings.h>
 #include <sys/stat.h>
@@ -33,13 +32,8 @@ const char *cli_bytes_text(uint64_t bytes) {
     return cli_keep_text("%s", vshi_bytes_text(bytes, text, sizeof text));
 }
 
-const char *cli_file_name(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 bool cli_has_ending(const char *path, const char *endings) {
-    const char *dot = strrchr(cli_file_name(path), '.');
+    const char *dot = strrchr(vshi_path_name(path), '.');
     for (const char *at = endings; dot != NULL && *at != '\0'; at += strspn(at, " ")) {
         const size_t length = strcspn(at, " ");
         if (strlen(dot + 1) == length && strncasecmp(dot + 1, at, length) == 0) {
@@ -76,12 +70,6 @@ const char *cli_end_path(const char *path, const char *end) {
     return cli_keep_text("%.*s%s", (int)length, path, end);
 }
 
-/* Finds the folder of a path, "." if the path names none. */
-static void find_folder(const char *path, char folder[PATH_MAX]) {
-    const int length = (int)(cli_file_name(path) - path);
-    snprintf(folder, PATH_MAX, "%.*s", length > 1 ? length - 1 : 1, length > 0 ? path : ".");
-}
-
 /* --- checks */
 
 /* Whether two paths lead to the same file, which need not exist. */
@@ -93,9 +81,9 @@ static bool is_same_file(const char *a, const char *b) {
         return one.st_dev == other.st_dev && one.st_ino == other.st_ino;
     }
     char first[PATH_MAX], second[PATH_MAX], real[PATH_MAX], other_real[PATH_MAX];
-    find_folder(a, first);
-    find_folder(b, second);
-    return !has_one && !has_other && strcmp(cli_file_name(a), cli_file_name(b)) == 0 &&
+    vshi_path_folder(a, first);
+    vshi_path_folder(b, second);
+    return !has_one && !has_other && strcmp(vshi_path_name(a), vshi_path_name(b)) == 0 &&
            realpath(first, real) != NULL && realpath(second, other_real) != NULL &&
            strcmp(real, other_real) == 0;
 }
@@ -148,11 +136,11 @@ int cli_check_outputs(const char *const *outputs, size_t output_count, const cha
 int cli_check_links(const char *namer, const char *path) {
     char folder[PATH_MAX], home[PATH_MAX], part[PATH_MAX], real[PATH_MAX];
     struct stat status;
-    const size_t own = (size_t)(cli_file_name(namer) - namer);
+    const size_t own = (size_t)(vshi_path_name(namer) - namer);
     const bool relative = strncmp(path, namer, own) == 0 && path[own] != '/';
-    find_folder(namer, folder);
+    vshi_path_folder(namer, folder);
     const size_t length = realpath(folder, home) == NULL || strcmp(home, "/") == 0 ? 0 : strlen(home);
-    for (size_t at = relative ? own : (size_t)(cli_file_name(path) - path); path[at] != '\0';
+    for (size_t at = relative ? own : (size_t)(vshi_path_name(path) - path); path[at] != '\0';
          at += strspn(path + at, "/")) {
         at += strcspn(path + at, "/");
         snprintf(part, sizeof part, "%.*s", (int)at, path);
@@ -171,7 +159,7 @@ int cli_check_links(const char *namer, const char *path) {
 int cli_check_folder(const char *path) {
     char folder[PATH_MAX];
     struct stat status;
-    find_folder(path, folder);
+    vshi_path_folder(path, folder);
     if (stat(folder, &status) == 0 || errno != ENOENT) {
         return CLI_OK;
     }

@@ -39,7 +39,7 @@ static int merge(const merge_settings *s, int argc, char **argv) {
     CLI_REFUSE_IF(code == CLI_HELP, "%s: its parts hold no command of bake; bake them again", s->output);
     CLI_TRY(code);
     if (bake.output != NULL) { /* a folder of objects stays one */
-        bake.output = *cli_file_name(bake.output) == '\0' ? cli_end_path(s->output, "/") : s->output;
+        bake.output = *vshi_path_name(bake.output) == '\0' ? cli_end_path(s->output, "/") : s->output;
     }
     bake.merged = s->output;
     bake.shard[0] = 0;

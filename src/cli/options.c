@@ -336,7 +336,7 @@ static void record_option(FILE *record, const cli_option *option, const char *va
     }
     fprintf(record, " --%s", option->name);
     if (value != NULL) {
-        record_word(record, strncmp(option->value, "FILE", 4) == 0 ? cli_file_name(value) : value);
+        record_word(record, strncmp(option->value, "FILE", 4) == 0 ? vshi_path_name(value) : value);
     }
 }
 
@@ -474,7 +474,7 @@ static int assign_operands(const command_line *p, const char **operands) {
         CLI_REFUSE_IF(operands[count] == NULL && !optional, "%s: no %s; see 'vdbshade %s --help'", command,
                       name, command);
         if (operands[count] != NULL) {
-            record_word(p->record, cli_file_name(operands[count]));
+            record_word(p->record, vshi_path_name(operands[count]));
         }
         at += length + (int)strspn(at + length, " ");
     }

@@ -244,13 +244,13 @@ static int find_outputs(regress_case *one) {
     CLI_TRY(cli_check(one->command == &cli_flat ? vsh_flat_scene_read(one->path, &cli_run, &flat, &cli_error)
                                                 : vsh_scene_read(one->path, &cli_run, &scene, &cli_error)));
     if (one->output == NULL && flat != NULL && flat->output != NULL) {
-        one->output = cli_keep_text("%s", cli_file_name(flat->output));
+        one->output = cli_keep_text("%s", vshi_path_name(flat->output));
     }
     if (one->output != NULL) {
         add_line(&one->outputs, one->output);
     }
     for (size_t i = 0; one->output == NULL && one->command == &cli_bake && i < scene->receiver_count; ++i) {
-        add_line(&one->outputs, cli_keep_text("%s", cli_file_name(scene->receivers[i].output)));
+        add_line(&one->outputs, cli_keep_text("%s", vshi_path_name(scene->receivers[i].output)));
     }
     vsh_scene_free(scene);
     vsh_flat_scene_free(flat);

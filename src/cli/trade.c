@@ -618,7 +618,7 @@ static void write_conditions(FILE *out, const trade_work *work) {
 }
 
 static void write_page(FILE *out, const trade_work *work) {
-    const char *input = cli_file_name(work->settings->bake.input);
+    const char *input = vshi_path_name(work->settings->bake.input);
     fputs(head, out);
     cli_write(out, "<title>", input, ": speed against accuracy</title>\n");
     cli_write(out, "<h1>Speed against accuracy: ", input, "</h1>\n");

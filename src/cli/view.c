@@ -45,7 +45,7 @@ static int write_scene(const view_settings *s) {
     const bool done =
         vsh_scene_read(s->inputs[0], &cli_run, &scene, &cli_error) == VSH_OK &&
         vsh_scene_check_outputs(scene, &s->output, 1, &cli_run, &cli_error) == VSH_OK &&
-        vsh_view_write_scene(s->output, cli_file_name(s->inputs[0]), scene, &cli_run, &cli_error) == VSH_OK;
+        vsh_view_write_scene(s->output, vshi_path_name(s->inputs[0]), scene, &cli_run, &cli_error) == VSH_OK;
     vsh_scene_free(scene);
     return done ? CLI_OK : cli_fail_with(NULL);
 }

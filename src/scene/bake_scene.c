@@ -377,11 +377,6 @@ static vsh_result open_page(vshi_scene_bake *bake, const vshi_target *target, vs
                           &page->page, error);
 }
 
-char *vshi_copy_folder(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash == NULL ? strdup(".") : slash == path ? strdup("/") : strndup(path, (size_t)(slash - path));
-}
-
 vsh_result vshi_page_group_open(vshi_scene_bake *bake, size_t first, size_t count, vshi_page_group *g,
                                 vsh_error *error) {
     const vsh_occluders_info *casters = &bake->report.occluders;
@@ -391,8 +386,13 @@ vsh_result vshi_page_group_open(vshi_scene_bake *bake, size_t first, size_t coun
     for (size_t i = 0; i < bake->target_count; ++i) {
         g->held.memory_held += bake->targets[i].charts->info.bytes;
     }
-    if (scratch != NULL || output != NULL) {
-        g->store.folder = scratch != NULL ? strdup(scratch) : vshi_copy_folder(output);
+    char folder[PATH_MAX];
+    if (scratch == NULL && output != NULL) {
+        vshi_path_folder(output, folder);
+        scratch = folder;
+    }
+    if (scratch != NULL) {
+        g->store.folder = strdup(scratch);
         if (g->store.folder == NULL) {
             return vshi_fail_memory(error, "lightmaps");
         }

@@ -66,9 +66,6 @@ vsh_result vshi_bake_find_provenance(vshi_scene_bake *bake, vsh_error *error);
 /* Adds the file's name to an error of a function that knows arrays only. Returns `result`. */
 vsh_result vshi_name_file(const char *path, vsh_result result, vsh_error *error);
 
-/* The folder of a path, to be freed; NULL if out of memory. */
-char *vshi_copy_folder(const char *path);
-
 /* --- channels (outputs.c) */
 
 typedef struct vshi_channels {

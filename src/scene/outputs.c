@@ -21,12 +21,6 @@ enum {
     NAME_BYTES = 120        /* of an object in file names, which have 255 with number and ending */
 };
 
-/* The part of a path after its folder. */
-static const char *find_name(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 /* --- names */
 
 /* Names a target's file: FILE.OBJECT.exr for an object, or FILE with its name for "%s"; FILE.PAGE.exr for one
@@ -39,7 +33,7 @@ static char *name_file(const vshi_target *target, size_t pages, const char *file
     }
     snprintf(number, sizeof number, "%zu", target->lightmap->page);
     const char *mark = target->object != NULL ? target->object : number;
-    const char *name = find_name(file), *dot = strrchr(name, '.');
+    const char *name = vshi_path_name(file), *dot = strrchr(name, '.');
     const char *place = target->object != NULL ? strstr(name, PLACE) : NULL;
     const char *end = dot != NULL ? dot : file + strlen(file);
     const int length =
@@ -591,7 +585,8 @@ static char *name_picture(const vshi_scene_bake *bake, const vshi_target *target
     if (bake->target_count == 1) {
         return strdup(file);
     }
-    const char *output = find_name(target->output != NULL ? target->output : ""), *dot = strrchr(output, '.');
+    const char *output = vshi_path_name(target->output != NULL ? target->output : ""),
+               *dot = strrchr(output, '.');
     const int stem = dot != NULL ? (int)(dot - output) : (int)strlen(output);
     const int before = (int)(strlen(file) - strlen(".png"));
     char *path;

@@ -53,19 +53,15 @@ static int32_t parse_count(const char *entry, const char *name) {
 
 /* Finds the number of shards by the names of existing parts. */
 static vsh_result count_shards(const char *parts, int32_t *count, vsh_error *error) {
-    const char *slash = strrchr(parts, '/');
-    char *folder = vshi_copy_folder(parts);
-    if (folder == NULL) {
-        return vshi_fail_memory(error, parts);
-    }
+    char folder[PATH_MAX];
+    vshi_path_folder(parts, folder);
     DIR *open = opendir(folder);
-    free(folder);
     if (open == NULL) {
         return vshi_fail(error, VSH_ERROR_READ, "%s: its folder cannot be read: %s", parts, strerror(errno));
     }
     int32_t least = INT32_MAX, most = 0;
     for (const struct dirent *entry; (entry = readdir(open)) != NULL;) {
-        const int32_t found = parse_count(entry->d_name, slash != NULL ? slash + 1 : parts);
+        const int32_t found = parse_count(entry->d_name, vshi_path_name(parts));
         least = found != 0 && found < least ? found : least;
         most = found > most ? found : most;
     }

@@ -220,11 +220,10 @@ static vsh_result add_settings(vsh_provenance *p, const vsh_provenance_source *s
 static vsh_result add_inputs(vsh_provenance *p, const file_list *inputs, vshi_job *job, vsh_error *error) {
     for (size_t i = 0; i < inputs->count; ++i) {
         const char *path = inputs->paths[i];
-        const char *slash = strrchr(path, '/');
         char name[NAME_SIZE], digest[VSH_DIGEST_TEXT],
             text[LINE_SIZE]; /* files' names have up to 255 bytes */
         VSHI_TRY(vshi_file_digest(path, digest, job, error));
-        snprintf(text, sizeof text, "sha256:%s %s", digest, slash != NULL ? slash + 1 : path);
+        snprintf(text, sizeof text, "sha256:%s %s", digest, vshi_path_name(path));
         snprintf(name, sizeof name, "vdbshade_input_%zu", i);
         VSHI_TRY(add(p, name, text, error));
         if (vshi_job_advance(job, HASH_UNITS / inputs->count)) {

@@ -69,11 +69,6 @@ static void describe(page *p, json_t *about, const char *key, json_t *value) {
         (key != NULL ? json_object_set_new(about, key, value) : json_array_append_new(about, value)) != 0;
 }
 
-static const char *find_file_name(const char *path) {
-    const char *slash = strrchr(path, '/');
-    return slash != NULL ? slash + 1 : path;
-}
-
 /* --- progress: a job for each file in the page */
 
 static vsh_result begin_job(const page *p, size_t total, vshi_job **job, vsh_error *error) {
@@ -324,7 +319,7 @@ static vsh_result add_image(page *p, const source *from, double held, json_t *pa
 static vsh_result add_image_file(page *p, const char *path, json_t *pages, vsh_error *error) {
     vsh_image_file *file = NULL;
     VSHI_TRY(vsh_image_read(path, p->run, &file, error));
-    source from = {.name = find_file_name(path), .image = vsh_image_view(file)};
+    source from = {.name = vshi_path_name(path), .image = vsh_image_view(file)};
     from.attributes = vsh_image_attributes(file, &from.attribute_count);
     const double held =
         4.0 * (double)from.image.width * (double)from.image.height * (double)from.image.channel_count;
@@ -341,8 +336,8 @@ static vsh_result add_bake(page *p, const vsh_view_bake *bake, const vshi_view_s
     json_t *about = json_object(), *pages = json_array();
     const char *name = surface != NULL       ? surface->name
                        : bake->name != NULL  ? bake->name
-                       : bake->model != NULL ? find_file_name(bake->model)
-                                             : find_file_name(bake->planes[0]);
+                       : bake->model != NULL ? vshi_path_name(bake->model)
+                                             : vshi_path_name(bake->planes[0]);
     describe(p, p->about, NULL, about);
     describe(p, about, "name", vshi_lit_text(name));
     describe(p, about, "uvSet", json_integer(surface != NULL ? -1 : bake->uv_set));

@@ -122,13 +122,13 @@ int cli_bake_scene_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
 
 /* Whether an output is for many objects: a folder, a path with OBJECT_NAME, or one without an ending. */
 static bool is_of_objects(const char *output) {
-    const char *name = cli_file_name(output);
+    const char *name = vshi_path_name(output);
     return cli_is_folder(output) || strstr(name, OBJECT_NAME) != NULL || strchr(name, '.') == NULL;
 }
 
 /* Adds OBJECT_NAME to a path: "out/" and "out" become out/%s.exr, out.png becomes out.%s.png. */
 static const char *add_object_name(const char *output) {
-    const char *name = cli_file_name(output), *dot = strrchr(name, '.');
+    const char *name = vshi_path_name(output), *dot = strrchr(name, '.');
     if (strstr(name, OBJECT_NAME) != NULL) {
         return output;
     }
@@ -141,7 +141,7 @@ static const char *add_object_name(const char *output) {
 /* Applies the output folder and --per-object to a receiver's output. */
 static const char *place_output(const cli_bake_settings *s, const char *output) {
     if (s->output_folder != NULL) {
-        output = cli_keep_text("%s/%s", s->output_folder, cli_file_name(output));
+        output = cli_keep_text("%s/%s", s->output_folder, vshi_path_name(output));
     }
     return s->per_object && !vsh_lit_is_output(output) ? add_object_name(output) : output;
 }
@@ -179,7 +179,7 @@ static int add_receivers(const cli_bake_settings *s, cli_bake_scene *made) {
                   s->input);
     /* a folder whose name has an ending is refused later, as an image that cannot be written */
     CLI_REFUSE_IF(s->output != NULL && !s->per_object && cli_is_folder(s->output) &&
-                      strchr(cli_file_name(s->output), '.') == NULL,
+                      strchr(vshi_path_name(s->output), '.') == NULL,
                   "-o '%s': is a folder; give an image in it, such as '%slightmap.exr', or an image for "
                   "each object with --per-object",
                   s->output, cli_end_path(s->output, "/"));

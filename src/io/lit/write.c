@@ -104,8 +104,7 @@ vsh_result vshi_lit_check_replaced(const vshi_lit_work *work, const char *path, 
 
 /* A number of 0 is left out. */
 static char *make_name(const char *output, const char *mark, const char *ending, unsigned number) {
-    const char *slash = strrchr(output, '/');
-    const char *name = slash != NULL ? slash + 1 : output;
+    const char *name = vshi_path_name(output);
     const char *own = vshi_path_ending(output);
     const size_t stem = own[0] != '\0' ? (size_t)(own - name) - 1 : strlen(name);
     const size_t size = stem + strlen(mark) + strlen(ending) + 16;

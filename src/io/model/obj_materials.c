@@ -262,7 +262,7 @@ char *vshi_obj_library(const char *path, int choice, const char *name, size_t si
     if (choice == 0) {
         return vshi_path_beside(path, name, size);
     }
-    const char *slash = strrchr(path, '/'), *own = slash != NULL ? slash + 1 : path;
+    const char *own = vshi_path_name(path);
     char *library = vshi_path_beside(path, own, strlen(own));
     if (library != NULL) {
         memcpy(strrchr(library, '.') + 1, "mtl", sizeof "mtl");
