@@ -139,7 +139,7 @@ static const char *find_nearest(const vsh_model *model, size_t first, size_t end
 static vsh_result fail_unmatched(const vsh_model *model, const char *path, const char *pattern,
                                  vsh_error *error) {
     char names[600] = "", materials[300] = "";
-    const size_t meshes = vsh_model_mesh_count(model), end = meshes + vshi_model_material_count(model);
+    const size_t meshes = vsh_model_mesh_count(model), end = meshes + model->material_count;
     list_names(model, 0, meshes, names, sizeof names);
     list_names(model, meshes, end, materials, sizeof materials);
     const bool of_material = strncmp(pattern, OF_MATERIAL, strlen(OF_MATERIAL)) == 0;

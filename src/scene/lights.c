@@ -223,14 +223,13 @@ vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double r
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_lights_from_model: unit is %g, expected at least 0",
                          unit);
     }
-    const size_t all = vshi_model_light_count(model);
+    const size_t all = model->light_count;
     const double own = vsh_model_unit(model) > 0.0 ? vsh_model_unit(model) : 1.0;
     vsh_light *made = NULL;
     VSHI_TRY(vshi_allocate((void **)&made, all, sizeof *made, "lights", error));
     for (size_t i = 0; i < all; ++i) {
-        const vshi_model_light given = vshi_model_get_light(model, i);
-        made[i] = make_light(&given, angle, radius, unit > 0.0 ? unit / own : 1.0);
-        make_name(given.name, made, i, made[i].name);
+        made[i] = make_light(&model->lights[i], angle, radius, unit > 0.0 ? unit / own : 1.0);
+        make_name(model->lights[i].name, made, i, made[i].name);
         const vsh_result result = vsh_light_check(&made[i], error);
         if (result != VSH_OK) {
             free(made);

@@ -67,7 +67,7 @@ struct vshi_masks {
 };
 
 vsh_result vshi_masks_create(const vsh_model *model, const char *path, vshi_masks **masks, vsh_error *error) {
-    const size_t materials = vshi_model_material_count(model);
+    const size_t materials = model->material_count;
     VSHI_TRY(vshi_allocate((void **)masks, 1, sizeof **masks, "alpha masks", error));
     vshi_masks *made = *masks;
     made->model = model;
@@ -79,7 +79,7 @@ vsh_result vshi_masks_create(const vsh_model *model, const char *path, vshi_mask
 }
 
 void vshi_masks_trim(vshi_masks *masks) {
-    for (size_t i = 0; masks->materials != NULL && i < vshi_model_material_count(masks->model); ++i) {
+    for (size_t i = 0; masks->materials != NULL && i < masks->model->material_count; ++i) {
         vshi_mask_table_free(&masks->materials[i].table);
     }
 }
@@ -349,8 +349,9 @@ static vsh_result read_vertices(vshi_masks *masks, const masked_mesh *mm, size_t
 /* Finds the material and the shape of a mesh, and reads them once. */
 static vsh_result read_mesh(vshi_masks *masks, size_t mesh, const vsh_run *run, masked_mesh *mm,
                             vsh_error *error) {
-    const int32_t number = vshi_model_mesh_material(masks->model, mesh);
-    *mm = (masked_mesh){.shape = &masks->shapes[masks->model->entries[mesh].shape]};
+    const size_t own = masks->model->entries[mesh].shape;
+    const int32_t number = masks->model->shapes[own].material - 1;
+    *mm = (masked_mesh){.shape = &masks->shapes[own]};
     if (number < 0) {
         return VSH_OK;
     }

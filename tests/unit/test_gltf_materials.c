@@ -33,10 +33,10 @@ static const char textures[] = "\"textures\":[{\"source\":0,\"sampler\":0}],\"sa
 
 TEST(masked_materials_come_with_their_image) {
     OWNED(vsh_model) *model = read_text("a.gltf", material_json(LEAF(",\"texCoord\":3"), textures));
-    assert_int_equal(vshi_model_material_count(model), 2);
-    assert_int_equal(vshi_model_mesh_material(model, 0), 1);
-    assert_int_equal(vshi_model_mesh_material(model, 1), -1);
-    assert_int_equal(vshi_model_mesh_material(model, 2), 0);
+    assert_int_equal(model->material_count, 2);
+    assert_int_equal(model->shapes[model->entries[0].shape].material, 2);
+    assert_int_equal(model->shapes[model->entries[1].shape].material, 0);
+    assert_int_equal(model->shapes[model->entries[2].shape].material, 1);
     assert_int_equal(vsh_model_mesh(model, 0, 0).alpha, VSH_ALPHA_MASKED);
     const vshi_material plain = vshi_model_get_material(model, 0);
     assert_string_equal(plain.name, "plain");
@@ -229,9 +229,9 @@ static void assert_vector(const double *given, double x, double y, double z) {
 
 TEST(lights_stand_where_their_nodes_do) {
     OWNED(vsh_model) *model = read_text("a.gltf", lit_json(nodes, lights));
-    assert_int_equal(vshi_model_light_count(model), 3);
-    const vshi_model_light sun = vshi_model_get_light(model, 0), lamp = vshi_model_get_light(model, 1);
-    const vshi_model_light spot = vshi_model_get_light(model, 2);
+    assert_int_equal(model->light_count, 3);
+    const vshi_model_light sun = model->lights[0], lamp = model->lights[1];
+    const vshi_model_light spot = model->lights[2];
     assert_string_equal(sun.name, "key");
     assert_int_equal(sun.type, VSHI_MODEL_LIGHT_DIRECTIONAL);
     assert_vector(sun.direction, -1, 0, 0);
@@ -313,7 +313,7 @@ TEST(lights_without_a_direction_or_of_an_unknown_type_are_left_out_with_a_warnin
         char node[128];
         snprintf(node, sizeof node, "{\"scale\":%s," CARRIES("0") "}", cases[i].scale);
         OWNED(vsh_model) *model = read_text("a.gltf", lit_json(node, cases[i].light));
-        assert_int_equal(vshi_model_light_count(model), cases[i].warning == NULL);
+        assert_int_equal(model->light_count, cases[i].warning == NULL);
         assert_true(cases[i].warning == NULL || strstr(warnings, cases[i].warning) != NULL);
     }
 }

@@ -466,8 +466,8 @@ TEST(material_libraries_decide_which_meshes_are_blended) {
             read_text("own.obj", text); /* own.mtl is read also where the named library is missing */
         assert_int_equal(vsh_model_mesh(model, 0, 0).alpha,
                          blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);
-        const int32_t material = vshi_model_mesh_material(model, 0);
-        assert_in_range(material, 0, vshi_model_material_count(model) - 1);
+        const int32_t material = model->shapes[model->entries[0].shape].material - 1;
+        assert_in_range(material, 0, model->material_count - 1);
         const vshi_material told = vshi_model_get_material(model, (size_t)material);
         assert_string_equal(told.name, names[i]);
         assert_int_equal(told.alpha, blended[i] ? VSH_ALPHA_BLENDED : VSH_ALPHA_OPAQUE);

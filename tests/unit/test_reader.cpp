@@ -124,8 +124,8 @@ std::string materials_file() {
 }
 
 void assert_same_materials(const vsh_model *here, const vsh_model *there) {
-    assert_int_equal(vshi_model_material_count(here), vshi_model_material_count(there));
-    for (size_t i = 0; i < vshi_model_material_count(here); ++i) {
+    assert_int_equal(here->material_count, there->material_count);
+    for (size_t i = 0; i < here->material_count; ++i) {
         const vshi_material a = vshi_model_get_material(here, i), b = vshi_model_get_material(there, i);
         assert_string_equal(a.name, b.name);
         assert_true(a.alpha == b.alpha && a.double_sided == b.double_sided && a.uv_set == b.uv_set);
@@ -141,9 +141,9 @@ void assert_same_materials(const vsh_model *here, const vsh_model *there) {
 }
 
 void assert_same_lights(const vsh_model *here, const vsh_model *there) {
-    assert_int_equal(vshi_model_light_count(here), vshi_model_light_count(there));
-    for (size_t i = 0; i < vshi_model_light_count(here); ++i) {
-        const vshi_model_light a = vshi_model_get_light(here, i), b = vshi_model_get_light(there, i);
+    assert_int_equal(here->light_count, there->light_count);
+    for (size_t i = 0; i < here->light_count; ++i) {
+        const vshi_model_light a = here->lights[i], b = there->lights[i];
         assert_string_equal(a.name, b.name);
         assert_int_equal(a.type, b.type);
         assert_memory_equal(a.position, b.position, sizeof a - offsetof(vshi_model_light, position));
@@ -169,7 +169,8 @@ TEST(models_are_the_same) {
         const size_t count = vsh_model_mesh_count(read.here);
         assert_int_equal(vsh_model_mesh_count(read.there), count);
         for (size_t i = 0; i < count; ++i) {
-            assert_int_equal(vshi_model_mesh_material(read.there, i), vshi_model_mesh_material(read.here, i));
+            assert_int_equal(read.there->shapes[read.there->entries[i].shape].material,
+                             read.here->shapes[read.here->entries[i].shape].material);
             assert_int_equal(vsh_model_uv_sets(read.there, i), vsh_model_uv_sets(read.here, i));
             for (int32_t set = -1; set < vsh_model_uv_sets(read.here, i); ++set) {
                 const vsh_mesh a = vsh_model_mesh(read.here, i, set), b = vsh_model_mesh(read.there, i, set);
@@ -523,9 +524,9 @@ void assert_sound(const vsh_model *model) {
         vsh_mesh_report report;
         const vsh_result result = vsh_mesh_check(&mesh, &report, &failure);
         assert_true(result == VSH_OK || result == VSH_ERROR_INPUT); // beyond numbers once moved
-        assert_true(vshi_model_mesh_material(model, i) < int32_t(vshi_model_material_count(model)));
+        assert_true(model->shapes[model->entries[i].shape].material <= int32_t(model->material_count));
     }
-    for (size_t i = 0; i < vshi_model_material_count(model); ++i) {
+    for (size_t i = 0; i < model->material_count; ++i) {
         const vshi_material m = vshi_model_get_material(model, i);
         assert_in_range(m.uv_set, 0, VSH_MAX_UV_SETS - 1);
         assert_in_range(m.wrap[0], 0, VSH_WRAP_CLAMP);
@@ -533,8 +534,8 @@ void assert_sound(const vsh_model *model) {
         assert_true(m.base_alpha >= 0.0 && m.base_alpha <= 1.0 && std::isfinite(m.uv_transform[5]));
         assert_in_range(m.image != nullptr ? m.image_size : 0, 0, 16);
     }
-    for (size_t i = 0; i < vshi_model_light_count(model); ++i) {
-        const vshi_model_light light = vshi_model_get_light(model, i);
+    for (size_t i = 0; i < model->light_count; ++i) {
+        const vshi_model_light light = model->lights[i];
         assert_in_range(light.type, 0, VSHI_MODEL_LIGHT_SPOT);
         assert_true(light.inner_angle <= light.outer_angle && light.outer_angle <= 1.5708);
         assert_true(light.intensity >= 0.0 && std::isfinite(light.intensity) && light.range >= 0.0);

@@ -22,10 +22,6 @@ const double vshi_uv_identity[6] = {1, 0, 0, 0, 1, 0};
 
 /* --- materials and images */
 
-size_t vshi_model_material_count(const vsh_model *model) {
-    return model->material_count;
-}
-
 vshi_material vshi_model_get_material(const vsh_model *model, size_t index) {
     const vshi_model_material *kept = &model->materials[index];
     vshi_material values = kept->values;
@@ -37,10 +33,6 @@ vshi_material vshi_model_get_material(const vsh_model *model, size_t index) {
         values.image_path = image->path;
     }
     return values;
-}
-
-int32_t vshi_model_mesh_material(const vsh_model *model, size_t index) {
-    return model->shapes[model->entries[index].shape].material - 1;
 }
 
 static void make_line(char *text) {
@@ -66,14 +58,6 @@ vsh_result vshi_model_add_materials(vsh_model *model, size_t count, vsh_error *e
 }
 
 /* --- lights, in the world */
-
-size_t vshi_model_light_count(const vsh_model *model) {
-    return model->light_count;
-}
-
-vshi_model_light vshi_model_get_light(const vsh_model *model, size_t index) {
-    return model->lights[index];
-}
 
 vsh_result vshi_model_add_light(vsh_model *model, const vshi_model_light *light, const char *name,
                                 vsh_error *error) {

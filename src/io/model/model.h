@@ -43,14 +43,9 @@ typedef struct vshi_material {
                                opaque if neither leaves anything out */
 } vshi_material;
 
-/* Number of materials: 0 for PLY. Formats other than glTF and OBJ give names and `alpha` alone. */
-size_t vshi_model_material_count(const vsh_model *model);
-
-/* Material `index` (< material count). The model owns its name and image. */
+/* Material `index` (< material_count). The model owns its name and image. Formats other than glTF and OBJ
+ * give names and `alpha` alone. */
 vshi_material vshi_model_get_material(const vsh_model *model, size_t index);
-
-/* The material of mesh `index` (< mesh count); -1: none. */
-int32_t vshi_model_mesh_material(const vsh_model *model, size_t index);
 
 /* How a light of a file shines. */
 enum {
@@ -72,12 +67,6 @@ typedef struct vshi_model_light {
     double inner_angle;  /* spot: half angle of full light, radians, 0 … outer_angle; else 0 */
     double outer_angle;  /* spot: half angle where light ends, radians, > 0 … π / 2; else 0 */
 } vshi_model_light;
-
-/* Number of lights of the file's scene: of glTF; of other formats 0. */
-size_t vshi_model_light_count(const vsh_model *model);
-
-/* Light `index` (< light count), in the order in which its nodes are met. Its name belongs to the model. */
-vshi_model_light vshi_model_get_light(const vsh_model *model, size_t index);
 
 /* The arrays of one mesh of the file, shared by the nodes that use it. */
 typedef struct vshi_model_shape {
@@ -147,7 +136,7 @@ struct vsh_model {
     vshi_answer answer; /* of the reader; its map may be NULL */
     vshi_model_entry *entries;
     size_t entry_count, entry_capacity;
-    vshi_model_light *lights; /* the model owns their names */
+    vshi_model_light *lights; /* of a glTF's scene; the model owns their names */
     size_t light_count, light_capacity;
     vshi_model_material *materials;
     size_t material_count;
