@@ -9,6 +9,20 @@
  * version. */
 #define VSHI_SHARED __attribute__((visibility("default")))
 
+/* Whether this is a sanitized build. Such processes cannot be confined: their shadow memory takes terabytes
+ * of address space, and their runtimes make forbidden system calls and read the memory through another
+ * process. */
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define VSHI_SANITIZED 1
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
+#define VSHI_SANITIZED 1
+#endif
+#endif
+#ifndef VSHI_SANITIZED
+#define VSHI_SANITIZED 0
+#endif
+
 VSH_BEGIN_C
 
 /* The version of the headers that this file is compiled with: "0.2.0". */

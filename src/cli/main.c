@@ -242,24 +242,12 @@ static int run_command(int argc, char **argv) {
 #define SYS_landlock_create_ruleset 444
 #endif
 
-/* Sanitizers read the memory of their process through another process. */
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define SANITIZED 1
-#endif
-#endif
-#ifndef SANITIZED
-#define SANITIZED 0
-#endif
-
 /* Landlock keeps a reader, which a damaged file may control, from the memory and environment of other
  * processes. Without Landlock this process closes its own. That stops debuggers and core files too, so it is
  * the exception. */
 static void close_own_memory(void) {
     enum { ASK_VERSION = 1 };
-    if (!SANITIZED && syscall(SYS_landlock_create_ruleset, NULL, 0, ASK_VERSION) < 1) {
+    if (!VSHI_SANITIZED && syscall(SYS_landlock_create_ruleset, NULL, 0, ASK_VERSION) < 1) {
         prctl(PR_SET_DUMPABLE, 0, 0, 0, 0);
     }
 }

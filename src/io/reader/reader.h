@@ -153,17 +153,4 @@ typedef struct vshi_answer_head {
 
 enum { VSHI_ANSWER_BEGUN = -1 };
 
-/* Sanitizers cannot be confined: their shadow memory takes terabytes of address space, and their runtimes
- * make forbidden system calls. */
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define VSHI_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
-#define VSHI_SANITIZED 1
-#endif
-#endif
-#ifndef VSHI_SANITIZED
-#define VSHI_SANITIZED 0
-#endif
-
 VSH_END_C
