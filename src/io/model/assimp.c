@@ -192,17 +192,6 @@ static vsh_result add_bone(const assimp *source, const struct aiBone *bone, size
     return VSH_OK;
 }
 
-static vsh_result check_moved(const assimp *source, const vshi_model_shape *shape, vsh_error *error) {
-    for (size_t v = 0; v < shape->vertex_count; ++v) {
-        if (!vshi_finite(vshi_vec_off(shape->positions + 3 * v))) {
-            return vshi_fail(error, VSH_ERROR_INPUT,
-                             "%s: bones move vertex %zu of %zu beyond the range of numbers", source->path, v,
-                             shape->vertex_count);
-        }
-    }
-    return VSH_OK;
-}
-
 /* Moves the vertices of mesh `mesh` into the world: Σ weight × bone's node × offset matrix; vertices without
  * a bone by `world`. Does so once, even if several nodes use the mesh. Errors: VSH_ERROR_INPUT (a bone
  * without a node, a vertex out of range, a weight that is not finite), VSH_ERROR_MEMORY. */
@@ -220,7 +209,8 @@ static vsh_result apply_skin(assimp *source, size_t mesh, vshi_model_shape *shap
         VSHI_TRY_DONE(add_bone(source, given->mBones[i], shape->vertex_count, blends, error));
     }
     vshi_model_blend_move(shape, blends, world);
-    result = check_moved(source, shape, error);
+    result = vshi_model_check_positions(source->path, "moved by bones", shape->positions, shape->vertex_count,
+                                        error);
 done:
     free(blends);
     return result;
