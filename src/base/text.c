@@ -3,6 +3,7 @@
 #include "base/file.h"
 #include "base/memory.h"
 
+#include <ctype.h>
 #include <nettle/base64.h>
 #include <stdlib.h>
 #include <string.h>
@@ -229,13 +230,6 @@ bool vshi_uri_is_remote(const char *uri) {
     return colon != NULL && colon < uri + strcspn(uri, "/%?#");
 }
 
-static int hex_digit(char c) {
-    const char *const digits = "0123456789abcdef";
-    const char lower = c >= 'A' && c <= 'F' ? (char)(c - 'A' + 'a') : c;
-    const char *at = lower != '\0' ? strchr(digits, lower) : NULL;
-    return at != NULL ? (int)(at - digits) : -1;
-}
-
 char *vshi_uri_path(const char *base, const char *uri) {
     const size_t length = strlen(uri);
     char *path = vshi_path_beside(uri[0] == '/' ? "" : base, uri, length);
@@ -244,10 +238,12 @@ char *vshi_uri_path(const char *base, const char *uri) {
     }
     char *to = path + strlen(path) - length;
     for (const char *from = uri; *from != '\0'; ++from) {
-        const int high = *from == '%' ? hex_digit(from[1]) : -1;
-        const int low = high >= 0 ? hex_digit(from[2]) : -1;
-        *to++ = low >= 0 ? (char)(16 * high + low) : *from;
-        from += low >= 0 ? 2 : 0;
+        if (*from == '%' && isxdigit((unsigned char)from[1]) && isxdigit((unsigned char)from[2])) {
+            *to++ = (char)strtol((const char[]){from[1], from[2], '\0'}, NULL, 16);
+            from += 2;
+        } else {
+            *to++ = *from;
+        }
     }
     *to = '\0';
     return path;
