@@ -16,20 +16,15 @@ static void keep_first(exr_result_t *status, exr_result_t next) {
 
 /* --- reading */
 
-/* The first message of OpenEXR about a failure, which is the most exact one. */
-typedef struct exr_log {
-    char message[400];
-} exr_log;
+enum { MESSAGE_ROOM = 400 };
 
+/* Keeps the first message about a failure, the most exact one, in the context's char[MESSAGE_ROOM]. */
 static void keep_message(exr_const_context_t context, exr_result_t code, const char *message) {
-    void *user = NULL;
+    void *kept = NULL;
     (void)code;
-    if (context == NULL || exr_get_user_data(context, &user) != EXR_ERR_SUCCESS || user == NULL) {
-        return;
-    }
-    exr_log *log = user;
-    if (log->message[0] == '\0') {
-        snprintf(log->message, sizeof log->message, "%s", message);
+    if (context != NULL && exr_get_user_data(context, &kept) == EXR_ERR_SUCCESS && kept != NULL &&
+        *(char *)kept == '\0') {
+        snprintf(kept, MESSAGE_ROOM, "%s", message);
     }
 }
 
@@ -159,11 +154,11 @@ static vsh_result convert_status(exr_result_t status) {
 
 vsh_result vshi_exr_read(const char *path, const vsh_run *run, vsh_image_file **file, vsh_error *error) {
     *file = NULL;
-    exr_log log = {""};
+    char message[MESSAGE_ROOM] = "";
     exr_reader reader = {0};
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
     setup.error_handler_fn = keep_message;
-    setup.user_data = &log;
+    setup.user_data = message;
     /* a file without its table of chunks is cut short; guessing the chunks would hide that */
     setup.flags = EXR_CONTEXT_FLAG_DISABLE_CHUNK_RECONSTRUCTION;
 
@@ -194,7 +189,7 @@ done:
     }
     if (result == VSH_OK && status != EXR_ERR_SUCCESS) {
         result = vshi_fail(error, convert_status(status), "%s: could not be read: %s", path,
-                           log.message[0] != '\0' ? log.message : exr_get_default_error_message(status));
+                           message[0] != '\0' ? message : exr_get_default_error_message(status));
     }
     if (result != VSH_OK) {
         vsh_image_free(reader.image);
