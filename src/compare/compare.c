@@ -20,7 +20,6 @@ enum { MOST_VALUES = INT32_MAX, REGIONS_SCRATCH = 8 /* bytes a value */ };
 
 void vshi_compare_coverage(uint64_t count, const float *golden, const float *values, uint8_t *mask,
                            vsh_coverage *coverage) {
-    VSHI_FLOATS;
     vsh_coverage c = {0, 0, 0, 0, count, 0.0};
     for (uint64_t i = 0; i < count; ++i) {
         const int a = golden == NULL || golden[i] > 0.5f, b = values == NULL || values[i] > 0.5f;

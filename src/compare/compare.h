@@ -26,9 +26,9 @@ void vshi_limits_allow_noise(vsh_limits *limits, double noise);
 /* Limits from a JSON file (docs/pipeline.md): for all channels, and for single ones. */
 typedef struct vshi_tolerances vshi_tolerances;
 
-/* Reads such a file. Free it with vshi_tolerances_free(). Errors: VSH_ERROR_ARGUMENT (path or tolerances
- * NULL), VSH_ERROR_READ, VSH_ERROR_INPUT (no JSON, unknown keys, values out of range, with the place),
- * VSH_ERROR_LIMIT (the parsed file may take over 64 MiB). */
+/* Reads such a file. Free it with vshi_tolerances_free(). Errors: VSH_ERROR_READ, VSH_ERROR_INPUT (no JSON,
+ * unknown keys, values out of range, with the place), VSH_ERROR_LIMIT (the parsed file may take over 64 MiB).
+ */
 vsh_result vshi_tolerances_read(const char *path, vshi_tolerances **tolerances, vsh_error *error);
 void vshi_tolerances_free(vshi_tolerances *tolerances); /* NULL does nothing */
 

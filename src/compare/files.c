@@ -41,7 +41,6 @@ vsh_limits vshi_limits_default(void) {
  * a million normal values is 5 standard errors away. The mean of the 16 edges or more that a penumbra needs
  * moves by a quarter of one edge's change. */
 void vshi_limits_allow_noise(vsh_limits *limits, double noise) {
-    VSHI_FLOATS;
     double *limit = limits->value;
     limits->options.noise = noise;
     limit[VSH_MEASURE_RMSE] = sqrt(limit[VSH_MEASURE_RMSE] * limit[VSH_MEASURE_RMSE] + noise * noise);
@@ -51,7 +50,6 @@ void vshi_limits_allow_noise(vsh_limits *limits, double noise) {
 }
 
 uint32_t vshi_compare_judge(const vsh_measures *measures, const vsh_limits *limits) {
-    VSHI_FLOATS;
     if (measures->count == 0) {
         return (UINT32_C(1) << VSH_MEASURE_COUNT) - 1;
     }
@@ -125,16 +123,10 @@ static vsh_result read_tolerances(vshi_json *reader, const vshi_value *root, voi
 }
 
 vsh_result vshi_tolerances_read(const char *path, vshi_tolerances **tolerances, vsh_error *error) {
-    VSHI_FLOATS;
-    VSHI_MAKES(tolerances);
-    VSHI_NEEDS(path);
     vsh_run run = vsh_run_default();
     run.memory_limit = MOST_TOLERANCE_BYTES;
     vshi_json reader = {.path = path, .run = &run, .error = error};
-    void *made;
-    VSHI_TRY(vshi_json_read(&reader, sizeof **tolerances, read_tolerances, &made));
-    *tolerances = made;
-    return VSH_OK;
+    return vshi_json_read(&reader, sizeof **tolerances, read_tolerances, (void **)tolerances);
 }
 
 void vshi_tolerances_free(vshi_tolerances *tolerances) {
