@@ -192,7 +192,6 @@ static void free_bake(vshi_scene_bake *bake) {
     vsh_occluders_free(bake->occluders);
     for (size_t i = 0; i < bake->target_count; ++i) {
         vsh_charts_free(bake->targets[i].charts);
-        vshi_mesh_set_free(&bake->targets[i].set);
         free(bake->targets[i].output);
         free(bake->targets[i].object);
     }

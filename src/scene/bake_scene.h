@@ -2,7 +2,6 @@
 #pragma once
 
 #include "base/memory.h"
-#include "geometry/mesh_set.h"
 #include "io/image/image.h"
 #include "lightmap/page.h"
 
@@ -18,9 +17,8 @@ typedef struct vshi_target {
     vsh_receiver receiver;        /* the scene's, with this lightmap's output, size and seams */
     vsh_charts *charts;           /* NULL before they are counted */
     bool unwrapped;               /* its UVs are new, or packed again */
-    char *object;      /* the object's name in files, unique among the lightmaps; NULL: several objects */
-    char *output;      /* FILE.OBJECT.exr of an object, FILE.PAGE.exr of a page, or the receiver's own */
-    vshi_mesh_set set; /* of meshes that do not cast */
+    char *object; /* the object's name in files, unique among the lightmaps; NULL: several objects */
+    char *output; /* FILE.OBJECT.exr of an object, FILE.PAGE.exr of a page, or the receiver's own */
 } vshi_target;
 
 enum { VSHI_LIT_PLANES = 4 };
@@ -123,8 +121,7 @@ void vshi_page_group_close(vshi_page_group *group); /* also zeroed ones */
 
 /* --- outputs */
 
-/* Lists the lightmaps of all receivers as targets. Finds which meshes are solid of receivers that do not
- * cast. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* Lists the lightmaps of all receivers as targets. Errors: VSH_ERROR_LIMIT, VSH_ERROR_MEMORY. */
 vsh_result vshi_list_lightmaps(vshi_scene_bake *bake, vsh_error *error);
 
 /* A receiver's image, with its bits, packing and colours. */

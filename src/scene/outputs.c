@@ -104,23 +104,6 @@ static char *name_object(const vshi_scene_bake *bake, const vshi_target *own, co
 
 /* --- the list of lightmaps */
 
-/* Finds which meshes are solid, unless they cast: then this is known already. */
-static vsh_result find_solid(vshi_target *target, const vsh_run *run, vsh_error *error) {
-    vsh_scene_lightmap *lightmap = target->lightmap;
-    bool known = true;
-    for (size_t m = 0; m < lightmap->mesh_count; ++m) {
-        known = known && vshi_mesh_sides(&lightmap->meshes[m]) != NULL;
-    }
-    if (known) {
-        return VSH_OK;
-    }
-    VSHI_TRY(vshi_mesh_set_create(lightmap->meshes, lightmap->mesh_count, &target->set, error));
-    lightmap->meshes = target->set.meshes;
-    vsh_error why;
-    const vsh_result result = vshi_mesh_set_solve(&target->set, run, &why);
-    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", lightmap->path, why.message);
-}
-
 /* Adds a receiver's pages. All pages go into one asset, but each page has its own image. */
 static vsh_result add_pages(vshi_scene_bake *bake, size_t index, vsh_error *error) {
     const vsh_receiver *receiver = &bake->scene.receivers[index];
@@ -159,7 +142,6 @@ static vsh_result add_pages(vshi_scene_bake *bake, size_t index, vsh_error *erro
         if (receiver->seams == VSH_SEAMS_DEFAULT) {
             target->receiver.seams = lit ? VSH_SEAMS_FIX : VSH_SEAMS_KEEP;
         }
-        VSHI_TRY(find_solid(target, &bake->run, error));
     }
     return VSH_OK;
 }
