@@ -349,16 +349,14 @@ double tree_distance(void *user, const double position[3]) {
 
 vsh_result vsh_grid_from_distance(const vsh_distance *field, const vsh_grid_options *options,
                                   const vsh_run *run, vsh_grid **grid, vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     return vshi::from_distance(field, nullptr, nullptr, options, run, grid, error);
 }
 
 vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *distances,
                                    const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                                    vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     VSHI_NEEDS(distances);
     return vshi::from_distance(field, distances, nullptr, options, run, grid, error);
 }
@@ -366,8 +364,7 @@ vsh_result vsh_grid_from_distances(const vsh_distance *field, vsh_distances_fn *
 vsh_result vsh_grid_from_sdf(const vsh_sdf *sdf, const vsh_grid_options *options, const vsh_run *run,
                              vsh_grid **grid, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     VSHI_TRY(vshi_sdf_check(sdf, error));
     vsh_sdf tree = *sdf;
     vsh_distance field = {vshi::tree_distance, &tree, 1.0, vshi_sdf_exact(sdf), {0, 0, 0}, {0, 0, 0}};

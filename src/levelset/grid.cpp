@@ -302,8 +302,7 @@ vsh_result vsh_grid_copy(const vsh_grid *grid, const int32_t index_min[3], const
 
 vsh_result vsh_grid_from_openvdb(const void *level_set, uint32_t version, uint32_t abi, const vsh_run *run,
                                  vsh_grid **grid, vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     VSHI_NEEDS(level_set);
     return vshi::guard_run(run, error, VSH_ERROR_INPUT, "OpenVDB", [&](const vsh_run &full) {
         vshi::check_openvdb(version, abi);

@@ -401,8 +401,7 @@ vsh_grid *from_meshes(const vsh_mesh *given, size_t count, const vsh_grid_option
 
 vsh_result vsh_grid_from_meshes(const vsh_mesh *meshes, size_t mesh_count, const vsh_grid_options *options,
                                 const vsh_run *run, vsh_grid **grid, vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "voxelize", [&](const vsh_run &full) {
         *grid = vshi::from_meshes(meshes, mesh_count, options, full);
     });

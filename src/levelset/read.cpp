@@ -415,8 +415,7 @@ vsh_result vshi_serve_copy(const char *path, vshi_decoder *request, const vsh_ru
 
 vsh_result vsh_grid_read(const char *path, const char *name, const vsh_run *run, vsh_grid **grid,
                          vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     VSHI_NEEDS(path);
     return vshi::guard_run(run, error, VSH_ERROR_READ, path,
                            [&](const vsh_run &full) { *grid = vshi::read(path, name, full); });

@@ -292,8 +292,7 @@ vsh_grid *unite(const vsh_grid_instance *instances, size_t count, const vsh_grid
 vsh_result vsh_grid_unite(const vsh_grid_instance *instances, size_t instance_count,
                           const vsh_grid_options *options, const vsh_run *run, vsh_grid **grid,
                           vsh_error *error) {
-    VSHI_NEEDS(grid);
-    *grid = nullptr;
+    VSHI_MAKES(grid);
     return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "unite", [&](const vsh_run &full) {
         *grid = vshi::unite(instances, instance_count, options, full);
     });

@@ -369,8 +369,7 @@ const Channel &channel_of(const vsh_volume &volume, size_t grid) {
 
 vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const vsh_run *run, vsh_voxels **voxels,
                                 vsh_error *error) {
-    VSHI_NEEDS(voxels);
-    *voxels = nullptr;
+    VSHI_MAKES(voxels);
     VSHI_NEEDS(grid);
     return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "band",
                            [&](const vsh_run &full) { *voxels = vshi::from_grid(*grid, band, full); });
@@ -378,8 +377,7 @@ vsh_result vsh_voxels_from_grid(const vsh_grid *grid, double band, const vsh_run
 
 vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3], double voxel_size,
                                const vsh_run *run, vsh_voxels **voxels, vsh_error *error) {
-    VSHI_NEEDS(voxels);
-    *voxels = nullptr;
+    VSHI_MAKES(voxels);
     VSHI_NEEDS_BOTH(box_min, box_max);
     return vshi::guard_run(run, error, VSH_ERROR_INTERNAL, "box", [&](const vsh_run &full) {
         vshi::initialize();
@@ -389,8 +387,7 @@ vsh_result vsh_voxels_from_box(const double box_min[3], const double box_max[3],
 
 vsh_result vsh_voxels_from_vdb(const char *path, const char *name, const vsh_run *run, vsh_voxels **voxels,
                                vsh_error *error) {
-    VSHI_NEEDS(voxels);
-    *voxels = nullptr;
+    VSHI_MAKES(voxels);
     VSHI_NEEDS(path);
     return vshi::guard_run(run, error, VSH_ERROR_READ, path,
                            [&](const vsh_run &full) { *voxels = vshi::from_vdb(path, name, full); });
