@@ -69,6 +69,16 @@ vsh_result vshi_fail_memory(vsh_error *error, const char *what) {
     return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", what);
 }
 
+vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *error) {
+    for (const vshi_range *r = ranges; r < ranges + count; ++r) {
+        if (!(r->value >= r->low && r->value <= r->high)) {
+            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", r->name, r->value,
+                             r->low, r->high);
+        }
+    }
+    return VSH_OK;
+}
+
 void vshi_one_line(char *text) {
     for (size_t length; *text != '\0'; text += length > 0 ? length : 1) {
         length = vshi_utf8_length(text);

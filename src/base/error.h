@@ -39,6 +39,15 @@ VSHI_SHARED vsh_result vshi_fail(vsh_error *error, vsh_result code, const char *
 /* Fails with VSH_ERROR_MEMORY: the system refused memory for `what`. */
 VSHI_SHARED vsh_result vshi_fail_memory(vsh_error *error, const char *what);
 
+/* A number that must lie in a range. */
+typedef struct vshi_range {
+    const char *name;
+    double value, low, high;
+} vshi_range;
+
+/* Errors: VSH_ERROR_ARGUMENT, naming the number, its value and its range. */
+vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *error);
+
 /* If a pointer is NULL, makes the public function around it fail with VSH_ERROR_ARGUMENT. */
 #define VSHI_NEEDS(pointer)                                                                                  \
     do {                                                                                                     \

@@ -112,19 +112,11 @@ static double find_visible(const grid *g, const view *v) {
 /* --- checks */
 
 static vsh_result check_options(const vsh_flat_options *o, vsh_error *error) {
-    const struct {
-        const char *name;
-        int32_t value, least, most;
-    } integers[] = {{"width", o->width, 1, MAX_SIZE},
-                    {"height", o->height, 1, MAX_SIZE},
-                    {"supersample", o->supersample, 1, MAX_SUPERSAMPLE},
-                    {"padding", o->padding, 0, VSHI_MAX_PADDING}};
-    for (size_t i = 0; i < sizeof integers / sizeof integers[0]; ++i) {
-        if (integers[i].value < integers[i].least || integers[i].value > integers[i].most) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "flat: %s %d: expected %d … %d", integers[i].name,
-                             integers[i].value, integers[i].least, integers[i].most);
-        }
-    }
+    const vshi_range ranges[] = {{"flat: width", o->width, 1, MAX_SIZE},
+                                 {"flat: height", o->height, 1, MAX_SIZE},
+                                 {"flat: supersample", o->supersample, 1, MAX_SUPERSAMPLE},
+                                 {"flat: padding", o->padding, 0, VSHI_MAX_PADDING}};
+    VSHI_TRY(vshi_check_ranges(ranges, sizeof ranges / sizeof ranges[0], error));
     for (int axis = 0; axis < 2; ++axis) {
         const double low = o->region_min[axis], high = o->region_max[axis];
         if (!(fabs(low) <= VSHI_OUTLINE_LARGEST && fabs(high) <= VSHI_OUTLINE_LARGEST && low < high)) {

@@ -680,19 +680,11 @@ static vsh_result check_colors(const char *name, const double color[3], double m
 
 static vsh_result check_options(const vsh_render_options *o, size_t light_count, vsh_error *error) {
     static const double BRIGHTEST = 1e15;
-    const struct {
-        const char *name;
-        double value, least, most;
-    } numbers[] = {
+    const vshi_range numbers[] = {
         {"width", o->width, 1, VSH_MAX_PICTURE_SIZE}, {"height", o->height, 1, VSH_MAX_PICTURE_SIZE},
         {"samples", o->samples, 1, MOST_SAMPLES},     {"shafts", o->shafts, 0.0, 100.0},
         {"shaft_steps", o->shaft_steps, 1, 64},       {"light_count", (double)light_count, 0, MOST_LIGHTS}};
-    for (size_t i = 0; i < sizeof numbers / sizeof numbers[0]; ++i) {
-        if (!(numbers[i].value >= numbers[i].least && numbers[i].value <= numbers[i].most)) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", numbers[i].name,
-                             numbers[i].value, numbers[i].least, numbers[i].most);
-        }
-    }
+    VSHI_TRY(vshi_check_ranges(numbers, sizeof numbers / sizeof numbers[0], error));
     const int32_t side = o->width > o->height ? o->width : o->height;
     if ((side + 2) * o->samples > MOST_SIDE) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "samples %d: a side of %d pixels allows at most %d",

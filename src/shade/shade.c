@@ -34,16 +34,6 @@ vsh_result vshi_run_stage(const vsh_run *run, const char *stage, size_t count, v
     return result;
 }
 
-vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *error) {
-    for (const vshi_range *r = ranges; r < ranges + count; ++r) {
-        if (!(r->value >= r->low && r->value <= r->high)) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s %g is out of range %g … %g", r->name, r->value,
-                             r->low, r->high);
-        }
-    }
-    return VSH_OK;
-}
-
 /* --- options and statistics */
 
 vsh_result vshi_shade_options_resolve(const vsh_shade_options *options, vsh_shade_options *full,

@@ -30,15 +30,6 @@ size_t vshi_find_group(const size_t *first, size_t count, size_t element);
 vsh_result vshi_run_stage(const vsh_run *run, const char *stage, size_t count, vshi_element_fn *fn,
                           void *user, vsh_error *error);
 
-/* A number that must lie in a range. */
-typedef struct vshi_range {
-    const char *name;
-    double value, low, high;
-} vshi_range;
-
-/* Errors: VSH_ERROR_ARGUMENT, naming the number, its value and its range. */
-vsh_result vshi_check_ranges(const vshi_range *ranges, size_t count, vsh_error *error);
-
 /* --- options and statistics */
 
 /* Resolves auto by whether there are triangles. Other methods stay. */

@@ -24,21 +24,14 @@ static const double LEAST = 1e-12, LARGEST = 1e12;
 static const double DEFAULT_BASE = 0.05; /* of the longer side */
 
 static vsh_result check_numbers(const vsh_heights_source *s, const char *name, vsh_error *error) {
-    const struct {
-        const char *what;
-        double value, low, high;
-    } fields[] = {
+    const vshi_range fields[] = {
         {"columns", s->columns, 2, VSH_MAX_HEIGHTS_SIDE}, {"rows", s->rows, 2, VSH_MAX_HEIGHTS_SIDE},
         {"size[0]", s->size[0], LEAST, LARGEST},          {"size[1]", s->size[1], LEAST, LARGEST},
         {"height", s->height, -LARGEST, LARGEST},         {"base", s->base, 0.0, LARGEST},
     };
-    for (size_t i = 0; i < sizeof fields / sizeof fields[0]; ++i) {
-        if (!(fields[i].value >= fields[i].low && fields[i].value <= fields[i].high)) {
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "%s: %s %g is out of range %g … %g", name,
-                             fields[i].what, fields[i].value, fields[i].low, fields[i].high);
-        }
-    }
-    return VSH_OK;
+    vsh_error why;
+    const vsh_result result = vshi_check_ranges(fields, sizeof fields / sizeof fields[0], &why);
+    return result == VSH_OK ? VSH_OK : vshi_fail(error, result, "%s: %s", name, why.message);
 }
 
 /* A source whose numbers are in range. */

@@ -9,22 +9,17 @@ static const double LEAST_STRETCH = 1.01; /* for max_stretch: below, rounding an
 
 enum { MOST_PADDING = 4096 };
 
-static vsh_result check_whole(const char *name, int32_t value, int32_t least, int32_t most,
-                              vsh_error *error) {
-    if (value < least || value > most) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: %s is %d, expected %d to %d", name, value, least,
-                         most);
-    }
-    return VSH_OK;
-}
-
 static vsh_result check_options(const vsh_unwrap_options *o, size_t mesh_count, vsh_error *error) {
-    VSHI_TRY(check_whole("width", o->width, 1, VSH_MAX_PAGE_SIZE, error));
-    VSHI_TRY(check_whole("height", o->height, 1, VSH_MAX_PAGE_SIZE, error));
-    VSHI_TRY(check_whole("max_pages", o->max_pages, 1, VSH_MAX_PAGES, error));
-    VSHI_TRY(check_whole("padding", o->padding, 0, MOST_PADDING, error));
-    VSHI_TRY(check_whole("keep_uvs", o->keep_uvs, VSH_UNWRAP_ALWAYS, VSH_UNWRAP_KEEP, error));
-    VSHI_TRY(check_whole("atlas", o->atlas, VSH_ATLAS_SHARED, VSH_ATLAS_OBJECTS, error));
+    const vshi_range ranges[] = {
+        {"unwrap: width", o->width, 1, VSH_MAX_PAGE_SIZE},
+        {"unwrap: height", o->height, 1, VSH_MAX_PAGE_SIZE},
+        {"unwrap: max_pages", o->max_pages, 1, VSH_MAX_PAGES},
+        {"unwrap: padding", o->padding, 0, MOST_PADDING},
+        {"unwrap: keep_uvs", (int32_t)o->keep_uvs, VSH_UNWRAP_ALWAYS, VSH_UNWRAP_KEEP},
+        {"unwrap: atlas", (int32_t)o->atlas, VSH_ATLAS_SHARED, VSH_ATLAS_OBJECTS},
+        {"unwrap: max_stretch", o->max_stretch, LEAST_STRETCH, INFINITY},
+    };
+    VSHI_TRY(vshi_check_ranges(ranges, sizeof ranges / sizeof ranges[0], error));
     if (o->atlas == VSH_ATLAS_OBJECTS && o->max_pages > 1) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: max_pages is %d: each object has one page",
                          o->max_pages);
@@ -37,10 +32,6 @@ static vsh_result check_options(const vsh_unwrap_options *o, size_t mesh_count, 
         return vshi_fail(error, VSH_ERROR_ARGUMENT,
                          "unwrap: texels_per_unit is %g, expected a finite number from 0 on",
                          o->texels_per_unit);
-    }
-    if (!(o->max_stretch >= LEAST_STRETCH)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "unwrap: max_stretch is %g, expected at least %g",
-                         o->max_stretch, LEAST_STRETCH);
     }
     for (size_t m = 0; o->density != NULL && m < mesh_count; ++m) {
         if (!(o->density[m] > 0.0) || !isfinite(o->density[m])) {
