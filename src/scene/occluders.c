@@ -329,12 +329,8 @@ static double choose_reach(const occluder_build *m, const vsh_grid_info *info) {
     if (o->receivers_min != NULL) {
         return find_reach(m->scene, info, o->receivers_min, o->receivers_max);
     }
-    double diagonal = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        const double side = info->bounds_max[axis] - info->bounds_min[axis];
-        diagonal += side * side;
-    }
-    diagonal = sqrt(diagonal);
+    const double diagonal =
+        vshi_length(vshi_sub(vshi_vec_of(info->bounds_max), vshi_vec_of(info->bounds_min)));
     const double margin = o->within > 0.0 ? o->within : WITHIN * diagonal;
     double around_min[3], around_max[3];
     for (int axis = 0; axis < 3; ++axis) {

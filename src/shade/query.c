@@ -126,13 +126,8 @@ static vsh_result order_points(const query_call *call, size_t count, uint64_t *o
                                vsh_error *error) {
     const vsh_field *field = call->query->ao.field;
     ordering o = {.call = call, .order = order};
-    double diagonal = 0.0, longest = 0.0;
-    for (int axis = 0; axis < 3; ++axis) {
-        const double side = field->world_max[axis] - field->world_min[axis];
-        diagonal += side * side;
-        longest = fmax(longest, side);
-    }
-    diagonal = sqrt(diagonal);
+    const vshi_vec sides = vshi_sub(vshi_vec_of(field->world_max), vshi_vec_of(field->world_min));
+    const double diagonal = vshi_length(sides), longest = fmax(sides.x, fmax(sides.y, sides.z));
     for (int axis = 0; axis < 3; ++axis) {
         o.low[axis] = field->world_min[axis] - FAR * diagonal;
     }
