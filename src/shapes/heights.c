@@ -304,7 +304,7 @@ struct vshi_heights {
     vshi_heights_info info;
     double to_cells[12]; /* world to cells: x and z from sample (0, 0), y up */
     double unit;         /* world units in a cell's width */
-    float *height;       /* [rows][columns] */
+    float height[];      /* [rows][columns] */
 };
 
 /* Height of the surface over (x, z), within the grid. */
@@ -366,19 +366,15 @@ vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *
     VSHI_TRY(check_transform(&t, &scale, error));
     VSHI_TRY(vshi_check_limit(&full, (double)t.samples * sizeof(float), t.name, error));
     vshi_heights *made;
-    VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, t.name, error));
-    const vsh_result result = vshi_allocate((void **)&made->height, t.samples, sizeof(float), t.name, error);
-    if (result != VSH_OK) {
-        free(made);
-        return result;
-    }
+    const size_t bytes = sizeof *made + t.samples * sizeof made->height[0];
+    VSHI_TRY(vshi_allocate((void **)&made, 1, bytes, t.name, error));
     const double cell = source->size[0] / (source->columns - 1);
     made->columns = source->columns;
     made->rows = source->rows;
     made->depth = source->size[1] / (source->rows - 1) / cell;
     made->lowest = t.bottom / cell;
     made->highest = t.highest / cell;
-    made->info.bytes = sizeof *made + t.samples * sizeof(float);
+    made->info.bytes = bytes;
     for (size_t i = 0; i < t.samples; ++i) {
         made->height[i] = (float)(source->height * (double)source->values[i] / cell);
     }
@@ -388,10 +384,7 @@ vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *
 }
 
 void vshi_heights_free(vshi_heights *heights) {
-    if (heights != NULL) {
-        free(heights->height);
-        free(heights);
-    }
+    free(heights);
 }
 
 void vshi_heights_get_info(const vshi_heights *heights, vshi_heights_info *info) {
