@@ -65,8 +65,8 @@ typedef struct assembly {
     size_t instance_count;
     vsh_grid **made; /* new grids among the instances */
     size_t made_count;
-    vshi_vec low, high; /* world box of the casters */
-    double finest;      /* voxel size of the level sets */
+    double low[3], high[3]; /* world box of the casters */
+    double finest;          /* voxel size of the level sets */
     vsh_grid_options options;
 } assembly;
 
@@ -114,15 +114,8 @@ static vsh_result check_caster(const vsh_caster *caster, const vshi_asset_place 
 
 /* Grows the casters' box by a box under a transform (NULL: identity); an empty box grows nothing. */
 static void grow_box(assembly *a, const double min[3], const double max[3], const double *transform) {
-    if (!(min[0] <= max[0] && min[1] <= max[1] && min[2] <= max[2])) {
-        return;
-    }
-    for (int corner = 0; corner < 8; ++corner) {
-        const vshi_vec p = vshi_transform_point(transform, (vshi_vec){corner & 1 ? max[0] : min[0],
-                                                                      corner & 2 ? max[1] : min[1],
-                                                                      corner & 4 ? max[2] : min[2]});
-        a->low = (vshi_vec){fmin(a->low.x, p.x), fmin(a->low.y, p.y), fmin(a->low.z, p.z)};
-        a->high = (vshi_vec){fmax(a->high.x, p.x), fmax(a->high.y, p.y), fmax(a->high.z, p.z)};
+    if (min[0] <= max[0] && min[1] <= max[1] && min[2] <= max[2]) {
+        vshi_grow_box_by(a->low, a->high, transform, min, max);
     }
 }
 
@@ -192,7 +185,7 @@ vsh_result vshi_scene_measure(const vsh_scene *scene, const vsh_assets *assets, 
         }
         most = fmax(most, area);
     }
-    *info = (vsh_assets_info){{a.low.x, a.low.y, a.low.z}, {a.high.x, a.high.y, a.high.z}, most, 0.0};
+    *info = (vsh_assets_info){{a.low[0], a.low[1], a.low[2]}, {a.high[0], a.high[1], a.high[2]}, most, 0.0};
     info->ao_distance = vshi_auto_ao_distance(info->bounds_min, info->bounds_max);
     return VSH_OK;
 }
@@ -210,7 +203,7 @@ static vsh_result choose_voxel_size(assembly *a, vsh_error *error) {
         o->voxel_size = count_selected(a->of) > 1 ? a->finest : 0.0;
         return VSH_OK;
     }
-    const vshi_vec sides = vshi_sub(a->high, a->low);
+    const vshi_vec sides = vshi_sub(vshi_vec_of(a->high), vshi_vec_of(a->low));
     const double longest = fmax(sides.x, fmax(sides.y, sides.z));
     if (!(longest > 0.0) || !isfinite(longest)) {
         return vshi_fail(error, VSH_ERROR_INPUT, "scene: the casters have no extent");
