@@ -156,7 +156,15 @@ void vshi_similarity_rotation(const double m[12], double scale, double q[4]);
 /* a × b: rotates by b, then by a. `result` may be a or b. */
 void vshi_quaternion_multiply(const double a[4], const double b[4], double result[4]);
 
-/* Grows the box low … high by a point. An empty box has low > high. */
+/* Empties the box low … high: an empty box has low > high. */
+static inline void vshi_empty_box(double low[3], double high[3]) {
+    for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = INFINITY;
+        high[axis] = -INFINITY;
+    }
+}
+
+/* Grows a box by a point. */
 static inline void vshi_grow_box(double low[3], double high[3], vshi_vec p) {
     const double at[3] = {p.x, p.y, p.z};
     for (int axis = 0; axis < 3; ++axis) {

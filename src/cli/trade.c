@@ -6,6 +6,7 @@
 #include "bake/bake.h"
 #include "base/clock.h"
 #include "base/memory.h"
+#include "base/vec.h"
 
 enum { MOST_RESOLUTIONS = 16, LEAST_RESOLUTION = 2, MOST_RESOLUTION = 65536 };
 
@@ -141,10 +142,7 @@ static int load(trade_work *work) {
     CLI_TRY(cli_check_input(vsh_assets_load(scene, &cli_run, &work->assets, &cli_error)));
     cli_say_auto_ao(&given, scene->shade.ao_distance);
     work->receivers = calloc(scene->receiver_count, sizeof *work->receivers);
-    for (int k = 0; k < 3; ++k) {
-        work->low[k] = INFINITY;
-        work->high[k] = -INFINITY;
-    }
+    vshi_empty_box(work->low, work->high);
     for (size_t i = 0; i < scene->receiver_count; ++i) {
         vsh_charts_info *info = &work->receivers[i].info;
         size_t mesh_count;
@@ -153,9 +151,8 @@ static int load(trade_work *work) {
                                                     &work->receivers[i].charts, &cli_error)));
         ++work->receiver_count;
         vsh_charts_get_info(work->receivers[i].charts, info);
-        for (int k = 0; k < 3 && info->samples > 0; ++k) {
-            work->low[k] = fmin(work->low[k], info->bounds_min[k]);
-            work->high[k] = fmax(work->high[k], info->bounds_max[k]);
+        if (info->samples > 0) {
+            vshi_grow_box_by(work->low, work->high, NULL, info->bounds_min, info->bounds_max);
         }
         work->receivers[i].first = work->texels;
         work->texels += (size_t)info->width * (size_t)info->height;

@@ -270,19 +270,15 @@ vsh_result vsh_receiver_charts(const vsh_scene *scene, size_t index, const vsh_m
 
 static vsh_result count_lightmaps(vshi_scene_bake *bake, bool warns, vsh_error *error) {
     const double start = vshi_seconds();
-    for (int axis = 0; axis < 3; ++axis) {
-        bake->receivers[0][axis] = INFINITY;
-        bake->receivers[1][axis] = -INFINITY;
-    }
+    vshi_empty_box(bake->receivers[0], bake->receivers[1]);
     for (size_t i = 0; i < bake->target_count; ++i) {
         vshi_target *target = &bake->targets[i];
         vsh_charts_info info;
         VSHI_TRY(create_charts(&bake->scene, target, warns, &bake->run, error));
         vsh_charts_get_info(target->charts, &info);
         bake->report.samples += info.samples;
-        for (int axis = 0; axis < 3 && info.samples > 0; ++axis) {
-            bake->receivers[0][axis] = fmin(bake->receivers[0][axis], info.bounds_min[axis]);
-            bake->receivers[1][axis] = fmax(bake->receivers[1][axis], info.bounds_max[axis]);
+        if (info.samples > 0) {
+            vshi_grow_box_by(bake->receivers[0], bake->receivers[1], NULL, info.bounds_min, info.bounds_max);
         }
     }
     bake->report.bake_s += vshi_seconds() - start;

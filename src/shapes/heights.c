@@ -335,10 +335,7 @@ static void place_cells(vshi_heights *made, const checked_heights *t, double sca
     }
     made->unit = scale * cell;
     vshi_heights_info *info = &made->info;
-    for (int axis = 0; axis < 3; ++axis) {
-        info->bounds_min[axis] = INFINITY;
-        info->bounds_max[axis] = -INFINITY;
-    }
+    vshi_empty_box(info->bounds_min, info->bounds_max);
     vshi_grow_box_by(info->bounds_min, info->bounds_max, m, (double[]){-corner[0], t->bottom, -corner[2]},
                      (double[]){corner[0], t->highest, corner[2]});
 }

@@ -68,13 +68,6 @@ static void node_transform(const vsh_sdf_node *node, double m[12]) {
     memcpy(m, rows, sizeof rows);
 }
 
-static void empty_box(double low[3], double high[3]) {
-    for (int axis = 0; axis < 3; ++axis) {
-        low[axis] = INFINITY;
-        high[axis] = -INFINITY;
-    }
-}
-
 /* Adds the subtree under node `root` of a tree; `transform` moves the tree to the world. */
 static void add_members(vshi_solids *solids, const vsh_sdf_node *nodes, int32_t root,
                         const double *transform) {
@@ -90,7 +83,7 @@ static void add_members(vshi_solids *solids, const vsh_sdf_node *nodes, int32_t 
     member *m = &solids->members[solids->count++];
     m->sdf = (vsh_sdf){nodes, (size_t)root + 1};
     m->scale = vshi_cbrt(fabs(vshi_transform_determinant(transform)));
-    empty_box(m->low, m->high);
+    vshi_empty_box(m->low, m->high);
     invert(transform, m->inverse);
     double min[3], max[3];
     vshi_sdf_bounds(&m->sdf, min, max);
@@ -144,7 +137,7 @@ vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, siz
     VSHI_TRY(vshi_allocate((void **)&made, 1, sizeof *made, "solids", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made->nodes, count, sizeof *made->nodes, "solids", error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made->members, nodes, sizeof *made->members, "solids", error));
-    empty_box(made->low, made->high);
+    vshi_empty_box(made->low, made->high);
     for (size_t i = 0; i < count; ++i) {
         const double *transform = transforms != NULL ? transforms + 12 * i : vshi_identity;
         VSHI_TRY_DONE(add_tree(made, &sdfs[i], transform, error));
