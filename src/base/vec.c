@@ -1,6 +1,7 @@
 #include "base/vec.h"
 
 #include "base/elementary.h"
+#include "base/error.h"
 
 #include <string.h>
 
@@ -43,6 +44,16 @@ double vshi_similarity_scale(const double m[12]) {
         }
     }
     return scale;
+}
+
+vsh_result vshi_similarity_check(const double *m, const char *what, double *scale, vsh_error *error) {
+    *scale = m != NULL ? vshi_similarity_scale(m) : 1.0;
+    if (!(*scale > 0.0) || (m != NULL && !vshi_finite((vshi_vec){m[3], m[7], m[11]}))) {
+        return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                         "%s: the transform must be finite and neither shear, scale unevenly nor flatten",
+                         what);
+    }
+    return VSH_OK;
 }
 
 bool vshi_transform_flattens(const double m[12]) {

@@ -147,6 +147,10 @@ void vshi_transform_compose(const double outer[12], const double inner[12], doub
 /* Uniform scale of a transform [12]; 0 for one that shears, scales unevenly or flattens. */
 double vshi_similarity_scale(const double m[12]);
 
+/* Finds the scale of a similarity (NULL: identity). Errors: VSH_ERROR_ARGUMENT, naming `what`, for any other
+ * transform, and for one that is not finite. */
+vsh_result vshi_similarity_check(const double *m, const char *what, double *scale, vsh_error *error);
+
 /* Whether a finite transform flattens all shapes. */
 bool vshi_transform_flattens(const double m[12]);
 

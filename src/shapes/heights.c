@@ -340,17 +340,6 @@ static void place_cells(vshi_heights *made, const checked_heights *t, double sca
                      (double[]){corner[0], t->highest, corner[2]});
 }
 
-static vsh_result check_transform(const checked_heights *t, double *scale, vsh_error *error) {
-    const double *m = t->source->transform;
-    *scale = m != NULL ? vshi_similarity_scale(m) : 1.0;
-    if (!(*scale > 0.0) || (m != NULL && !vshi_finite((vshi_vec){m[3], m[7], m[11]}))) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT,
-                         "%s: the transform must be finite and neither shear, scale unevenly nor flatten",
-                         t->name);
-    }
-    return VSH_OK;
-}
-
 vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *run, vshi_heights **heights,
                                vsh_error *error) {
     VSHI_FLOATS;
@@ -360,7 +349,7 @@ vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *
     double scale = 1.0;
     VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(check_source(source, "vshi_heights_create", &t, error));
-    VSHI_TRY(check_transform(&t, &scale, error));
+    VSHI_TRY(vshi_similarity_check(source->transform, t.name, &scale, error));
     VSHI_TRY(vshi_check_limit(&full, (double)t.samples * sizeof(float), t.name, error));
     vshi_heights *made;
     const size_t bytes = sizeof *made + t.samples * sizeof made->height[0];

@@ -185,13 +185,7 @@ static vsh_result check(const double *spheres, size_t count, const double *trans
     if (count > MOST) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "spheres: %zu are more than %zu", count, MOST);
     }
-    const double *m = transform;
-    *scale = m != NULL ? vshi_similarity_scale(m) : 1.0;
-    if (!(*scale > 0.0) || (m != NULL && !vshi_finite((vshi_vec){m[3], m[7], m[11]}))) {
-        return vshi_fail(
-            error, VSH_ERROR_ARGUMENT,
-            "spheres: the transform must be finite and neither shear, scale unevenly nor flatten");
-    }
+    VSHI_TRY(vshi_similarity_check(transform, "spheres", scale, error));
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY(check_sphere(spheres + 4 * i, NULL, i, error));
     }
