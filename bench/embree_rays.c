@@ -30,7 +30,7 @@ static uint32_t cell_of(int bits, const uint32_t digits[2]) {
 }
 
 uint32_t (*bench_rays_net(const vshi_sampler *sampler, int32_t rays))[2] {
-    const uint32_t(*net)[2] = vshi_sampler_net(sampler);
+    const uint32_t(*net)[2] = vshi_sampler_cells(sampler, 0); /* the net, reordered */
     uint32_t(*sorted)[2] = malloc((size_t)rays * sizeof *sorted);
     const int bits = bits_of(rays);
     for (int32_t i = 0; sorted != NULL && i < rays; ++i) {

@@ -363,7 +363,6 @@ static void sample_mesh(const vsh_field *field, const vsh_mesh *mesh, double are
         vshi_mesh_triangle(mesh, i, corner);
         before += vshi_triangle_area(corner);
         const vshi_vec normal = vshi_unit(vshi_triangle_normal(corner));
-        bool any = false;
         for (; next < places && ((double)next + 0.5) / (double)places * area <= before; ++next) {
             const vshi_vec at =
                 vshi_triangle_point(corner, fraction((double)next * GOLDEN), fraction((double)next * SILVER));
@@ -374,13 +373,11 @@ static void sample_mesh(const vsh_field *field, const vsh_mesh *mesh, double are
             if (thick < 0.0) {
                 continue;
             }
-            any = true;
             ++gone;
             if (isfinite(thick)) {
                 thickness[measured++] = thick;
             }
         }
-        lost->triangles += any;
     }
     lost->share = (double)gone / (double)places;
     qsort(thickness, measured, sizeof *thickness, by_value);
@@ -402,7 +399,7 @@ vsh_result vshi_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, 
     for (size_t m = 0; m < mesh_count; ++m) {
         const double area = mesh_area(&meshes[m]);
         const size_t places = LEAST + (size_t)(sum > 0.0 ? PLACES * (area / sum) : 0.0);
-        vshi_lost found = {0.0, 0.0, 0};
+        vshi_lost found = {0.0, 0.0};
         if (area > 0.0) {
             sample_mesh(field, &meshes[m], area, places, triangles, thickness, &found);
         }

@@ -51,7 +51,6 @@ typedef struct vshi_lost {
     double share;     /* of the mesh's area, 0 … 1 */
     double thickness; /* of at least nine tenths of them, world units: voxels of 0.8 times that hold them. 0:
                          not known */
-    uint64_t triangles; /* with such places, among the tested ones */
 } vshi_lost;
 
 /* Tests some 16,000 places of the meshes of a field for a solid, into lost[mesh_count]. `triangles` of the

@@ -17,10 +17,6 @@ static const char *find_name(const vsh_mesh *mesh) {
     return mesh->name != NULL ? mesh->name : "";
 }
 
-static const char *find_object(const vsh_mesh *mesh) {
-    return mesh->object_name != NULL ? mesh->object_name : find_name(mesh);
-}
-
 /* Warns of charts closer than a texel, unless charts overlap: then a warning says so. */
 static void warn_close(const vshi_target *target, const vsh_uv_report *reports, const vsh_run *run) {
     const vsh_receiver *receiver = &target->receiver;
@@ -121,8 +117,8 @@ vsh_result vshi_refuse_uvs(const vshi_target *target, const vsh_uv_report *repor
         "object; --per-object gives each object an image; --receive NAME chooses some objects; "
         "\"allow_overlap\": true in a scene's receiver bakes the UVs as they are",
         receiver->path, count, target->lightmap->mesh_count, texels, covered,
-        find_object(&target->lightmap->meshes[worst - reports]), worst->other_texels,
-        worst->other_mesh_texels, find_object(&target->lightmap->meshes[worst->other_mesh]));
+        vshi_object_name(&target->lightmap->meshes[worst - reports]), worst->other_texels,
+        worst->other_mesh_texels, vshi_object_name(&target->lightmap->meshes[worst->other_mesh]));
 }
 
 /* --- baked texels */
@@ -200,7 +196,7 @@ double vshi_warn_vertex_colors(const vshi_target *target, const double *errors, 
             run,
             "%s: triangles of %zu of %zu meshes are too large for the light on them; mesh '%s' is %.2g off "
             "(RMSE); subdivide it, or bake a lightmap",
-            lightmap->output, count, lightmap->mesh_count, find_object(&lightmap->meshes[worst]),
+            lightmap->output, count, lightmap->mesh_count, vshi_object_name(&lightmap->meshes[worst]),
             errors[worst]);
     }
     return errors[worst];
@@ -209,7 +205,7 @@ double vshi_warn_vertex_colors(const vshi_target *target, const double *errors, 
 /* --- lights that objects hide: a sky dome hides the sun, a bulb its own lamp */
 
 static bool is_same(const vsh_mesh *a, const vsh_mesh *b) {
-    return strcmp(find_object(a), find_object(b)) == 0;
+    return strcmp(vshi_object_name(a), vshi_object_name(b)) == 0;
 }
 
 /* Adds a texel of a mesh to the objects that each light reaches. */
@@ -263,7 +259,7 @@ void vshi_warn_lights(const vshi_scene_bake *bake, const vsh_run *run) {
             vshi_warn(
                 run,
                 "%s%s reaches '%s' alone; if that hides it from the others, --no-cast '%s' lets it through",
-                what, name, find_object(lit), find_object(lit));
+                what, name, vshi_object_name(lit), vshi_object_name(lit));
         }
     }
 }

@@ -302,10 +302,6 @@ void vshi_sampler_free(vshi_sampler *sampler) {
     }
 }
 
-const uint32_t (*vshi_sampler_net(const vshi_sampler *sampler))[2] {
-    return (const uint32_t(*)[2])sampler->net;
-}
-
 void vshi_sampler_shift(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, uint32_t shift[2]) {
     shift[0] = hash2(hash2(texel, purpose), (uint32_t)sampler->frame);
     shift[1] = hash(shift[0]);

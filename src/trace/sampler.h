@@ -18,9 +18,8 @@ void vshi_sampler_free(vshi_sampler *sampler); /* NULL does nothing */
 void vshi_sampler_disc(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, int32_t first,
                        int32_t count, double (*points)[2]);
 
-/* The net of VSH_SAMPLER_SOBOL: the digits of points 0 … rays - 1 in the unit square, the same for all texels
- * (NULL for other kinds). A texel maps net ^ shift, times 2^-32, to the disc (Shirley and Chiu). */
-const uint32_t (*vshi_sampler_net(const vshi_sampler *sampler))[2];
+/* The shift of a texel's net. VSH_SAMPLER_SOBOL has one net of points for all texels. A texel maps the
+ * points' digits ^ shift, times 2^-32, to the disc (Shirley and Chiu). */
 void vshi_sampler_shift(const vshi_sampler *sampler, uint32_t texel, uint32_t purpose, uint32_t shift[2]);
 
 /* Blocks of a net: the first VSHI_SAMPLER_BLOCK points, then always as many as before. A block of 2^k points
