@@ -395,7 +395,7 @@ static vsh_result make_layer_field(occluder_build *m, const vsh_scene_layer *lay
         resolution = 0;
     }
     if (resolution == 0 && triangles != NULL && m->options.voxels == 0) {
-        VSHI_TRY(vshi_occluders_unknown(triangles, 0.0, field, error));
+        VSHI_TRY(vshi_occluders_unknown(triangles, field, error));
         const vshi_mesh_set *set = vshi_assets_set(m->assets);
         if (*field != NULL && layer == NULL && set->count > 0) {
             vshi_mesh_set_note(set, 0.0, 0.0, &m->voxel_run);
@@ -471,7 +471,7 @@ static vsh_result add_direct(occluder_build *m, size_t index, size_t place, vsh_
     layer->spheres = vshi_assets_caster(m->assets, index)->spheres;
     if (layer->ao != 0 && bakes_ao(m->scene)) {
         VSHI_TRY(vshi_scene_caster_triangles(m->scene, m->assets, index, &m->run, triangles, error));
-        VSHI_TRY(vshi_occluders_unknown(*triangles, 0.0, field, error));
+        VSHI_TRY(vshi_occluders_unknown(*triangles, field, error));
         layer->field = *field;
         layer->triangles = *triangles;
     }

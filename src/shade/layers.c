@@ -38,12 +38,6 @@ static vsh_result check_layer(const vshi_layer *layer, vsh_error *error) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "remap from %g to %g: expected a rise", layer->remap[0],
                          layer->remap[1]);
     }
-    if (layer->heights != NULL && layer->spheres != NULL) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "both heights and spheres: expected one of them");
-    }
-    if (layer->field == NULL && !vshi_layer_is_closed(layer)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "none of field, heights and spheres: expected one");
-    }
     for (size_t i = 0; layer->lights != NULL && i < layer->light_count; ++i) {
         if (layer->lights[i] == NULL) {
             return vshi_fail(error, VSH_ERROR_ARGUMENT, "lights[%zu] is NULL", i);

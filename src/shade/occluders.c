@@ -61,10 +61,6 @@ static double finest_voxel(const vshi_layer *layers, size_t count) {
 }
 
 static vsh_result copy_layers(const vshi_occluder_parts *parts, vshi_occluders_own *own, vsh_error *error) {
-    if (parts->layer_count > VSHI_MAX_LAYERS || (parts->layer_count > 0 && parts->layers == NULL)) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "%zu layers%s: expected at most %d", parts->layer_count,
-                         parts->layers == NULL ? " at NULL" : "", VSHI_MAX_LAYERS);
-    }
     void *layers;
     VSHI_TRY(vshi_allocate(&layers, parts->layer_count, sizeof *own->layers, "layers", error));
     own->layers = layers;
@@ -96,8 +92,7 @@ static vsh_result check_box(const double low[3], const double high[3], double lo
     return VSH_OK;
 }
 
-vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_size, vsh_field **field,
-                                  vsh_error *error) {
+vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, vsh_field **field, vsh_error *error) {
     double low[3], high[3], longest = 0.0;
     *field = NULL;
     vshi_triangles_bounds(triangles, low, high);
@@ -107,11 +102,8 @@ vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_
     for (int axis = 0; axis < 3; ++axis) {
         longest = fmax(longest, high[axis] - low[axis]);
     }
-    if (voxel_size == 0.0) {
-        VSHI_TRY(check_box(low, high, longest, error));
-        voxel_size = longest / VSHI_TRACED_RESOLUTION;
-    }
-    return vshi_field_create_unknown(voxel_size, low, high, field, error);
+    VSHI_TRY(check_box(low, high, longest, error));
+    return vshi_field_create_unknown(longest / VSHI_TRACED_RESOLUTION, low, high, field, error);
 }
 
 /* Makes a field without distances: of casters that are only traced, or, if all casters are in layers, of
@@ -119,17 +111,11 @@ vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_
 static vsh_result make_fieldless(const vshi_occluder_parts *parts, vshi_occluders_own *own,
                                  vsh_error *error) {
     if (parts->triangles != NULL) {
-        VSHI_TRY(vshi_occluders_unknown(parts->triangles, parts->voxel_size, &own->field, error));
+        VSHI_TRY(vshi_occluders_unknown(parts->triangles, &own->field, error));
     }
-    if (own->field != NULL) {
-        return VSH_OK;
-    }
-    if (parts->layer_count == 0 && parts->voxel_size == 0.0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "occluders: neither a field nor triangles nor layers");
-    }
-    const double voxel_size =
-        parts->voxel_size != 0.0 ? parts->voxel_size : finest_voxel(own->layers, parts->layer_count);
-    return vshi_field_create_empty(voxel_size, &own->field, error);
+    return own->field != NULL
+               ? VSH_OK
+               : vshi_field_create_empty(finest_voxel(own->layers, parts->layer_count), &own->field, error);
 }
 
 static vsh_result make(const vshi_occluder_parts *parts, vshi_occluders_own *own, vsh_occluders **occluders,
@@ -249,7 +235,7 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
         own.triangles_s = vshi_seconds() - start;
     }
     if (own.field == NULL) {
-        VSHI_TRY_DONE(vshi_occluders_unknown(own.triangles, 0.0, &own.field, error));
+        VSHI_TRY_DONE(vshi_occluders_unknown(own.triangles, &own.field, error));
         vshi_mesh_set_note(&set, 0.0, 0.0, &resolved);
     }
     const vshi_occluder_parts parts = {

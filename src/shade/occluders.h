@@ -40,7 +40,7 @@ static inline bool vshi_layer_is_closed(const vshi_layer *layer) {
     return layer->heights != NULL || layer->spheres != NULL;
 }
 
-/* The parts of a handle. Views: nothing is owned. */
+/* The parts of a handle: at least a field, triangles or a layer. Views: nothing is owned. */
 typedef struct vshi_occluder_parts {
     const vsh_field *field; /* casters in no layer; NULL: they are known by their triangles alone, or all
                                casters are in layers */
@@ -51,9 +51,6 @@ typedef struct vshi_occluder_parts {
         *true_triangles; /* these two together are all casters, the truth that the errors of a
                             bake are measured against; not with layers. NULL: no measuring */
     const vshi_solids *true_solids;
-    double voxel_size; /* unit of start offsets if there is no field, world units, 1e-12 … 1e12; 0: 1/96 of
-                          the triangles' longest side, else the voxels of the finest layer, else 1e-5 of the
-                          first layer's longest side */
 } vshi_occluder_parts;
 
 /* The parts that a handle owns and frees. Other members are NULL. */
@@ -87,16 +84,15 @@ struct vsh_occluders {
 enum { VSHI_TRACED_RESOLUTION = 96 };
 
 /* Makes a field without distances for casters that are only traced. *field is NULL if there are no triangles.
- * A voxel_size of 0 is the box's longest side over VSHI_TRACED_RESOLUTION. Errors: as
- * vshi_field_create_unknown(), VSH_ERROR_LIMIT (voxel_size 0: the box is too large, too small or too far from
+ * Errors: as vshi_field_create_unknown(), VSH_ERROR_LIMIT (the box is too large, too small or too far from
  * the origin for voxels). */
-vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, double voxel_size, vsh_field **field,
-                                  vsh_error *error);
+vsh_result vshi_occluders_unknown(const vshi_triangles *triangles, vsh_field **field, vsh_error *error);
 
-/* Makes occluders of parts. The layers are copied; what they and the parts refer to must outlive the handle,
- * unless it is in `own` (NULL: nothing). The handle takes over the contents of `own`, which are freed even
- * after an error. Errors: VSH_ERROR_ARGUMENT (neither field nor triangles nor layers nor a voxel size; more
- * layers than VSHI_MAX_LAYERS; as vshi_layer_check()), VSH_ERROR_MEMORY. */
+/* Makes occluders of parts. Without a field, start offsets count voxels of VSHI_TRACED_RESOLUTION, else of
+ * the finest layer, else 1e-5 of the first layer's longest side. The layers are copied; what they and the
+ * parts refer to must outlive the handle, unless it is in `own` (NULL: nothing). The handle takes over the
+ * contents of `own`, which are freed even after an error. Errors: as vshi_layer_check() and
+ * vshi_occluders_unknown(), VSH_ERROR_MEMORY. */
 vsh_result vshi_occluders_make(const vshi_occluder_parts *parts, vshi_occluders_own *own,
                                vsh_occluders **occluders, vsh_error *error);
 void vshi_occluders_own_free(vshi_occluders_own *own);

@@ -99,18 +99,12 @@ static void take_layer(fuzz_input *input, vshi_layer *layer) {
 }
 
 vsh_occluders *fuzz_take_occluders(fuzz_input *input) {
-    vshi_occluder_parts parts = {.field = NULL};
+    const uint8_t how = fuzz_byte(input) % 8;
     vshi_layer layer;
-    fuzz_take(input, &parts, sizeof parts);
-    const uint8_t how = fuzz_byte(input);
-    parts.field = how & 1 ? NULL : made.field;
-    parts.triangles = parts.true_triangles = NULL;
-    parts.true_solids = NULL;
-    parts.layers = NULL; /* a count without an array is refused */
-    if (how % 8 < 2) {
+    const vshi_occluder_parts parts = {
+        .field = how == 1 ? NULL : made.field, .layers = &layer, .layer_count = how < 2};
+    if (how < 2) {
         take_layer(input, &layer);
-        parts.layers = &layer;
-        parts.layer_count = 1;
     }
     vsh_occluders *occluders;
     FUZZ_MAKE(occluders, vshi_occluders_make(&parts, NULL, &occluders, fuzz_error()));

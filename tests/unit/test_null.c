@@ -132,10 +132,11 @@ TEST(scenes_need_their_arguments) {
 
 /* Something that casts nothing. */
 static vsh_occluders *no_casters(void) {
-    vshi_occluder_parts parts = {.field = NULL};
-    parts.voxel_size = 1.0;
+    vshi_occluders_own own = {.field = NULL};
     vsh_occluders *casters = NULL;
-    assert_int_equal(vshi_occluders_make(&parts, NULL, &casters, &error), VSH_OK);
+    assert_int_equal(vshi_field_create_empty(1.0, &own.field, &error), VSH_OK);
+    const vshi_occluder_parts parts = {.field = own.field};
+    assert_int_equal(vshi_occluders_make(&parts, &own, &casters, &error), VSH_OK);
     return casters;
 }
 
