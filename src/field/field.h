@@ -53,10 +53,9 @@ typedef struct vshi_lost {
                          not known */
 } vshi_lost;
 
-/* Tests some 16,000 places of the meshes of a field for a solid, into lost[mesh_count]. `triangles` of the
- * same meshes measure the lost parts, and tell thin parts from the edges of thick ones, which voxels cut; may
- * be NULL. Runs some milliseconds on the calling thread. Errors: VSH_ERROR_ARGUMENT (field, meshes or lost
- * NULL), VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_MEMORY. */
+/* Tests some 16,000 places of the checked meshes of a field for a solid, into lost[mesh_count]. `triangles`
+ * of the same meshes measure the lost parts, and tell thin parts from the edges of thick ones, which voxels
+ * cut; may be NULL. Runs some milliseconds on the calling thread. Errors: VSH_ERROR_MEMORY. */
 vsh_result vshi_field_find_lost(const vsh_field *field, const vsh_mesh *meshes, size_t mesh_count,
                                 const vshi_triangles *triangles, vshi_lost *lost, vsh_error *error);
 

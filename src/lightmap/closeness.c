@@ -280,30 +280,14 @@ done:
 vsh_result vshi_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
                                  const vsh_run *run, vshi_closeness *found, vsh_error *error) {
     VSHI_FLOATS;
-    VSHI_NEEDS_OF(mesh_count, meshes);
-    VSHI_NEEDS(found);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
-    if (width < 1 || height < 1 || width > VSH_MAX_LIGHTMAP_SIZE || height > VSH_MAX_LIGHTMAP_SIZE) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "closeness of charts at %d × %d: expected 1 … %d", width,
-                         height, VSH_MAX_LIGHTMAP_SIZE);
-    }
-    closeness c = {
-        .meshes = meshes, .mesh_count = mesh_count, .width = width, .height = height, .run = &full};
+    closeness c = {.meshes = meshes, .mesh_count = mesh_count, .width = width, .height = height, .run = run};
     for (size_t m = 0; m < mesh_count; ++m) {
-        VSHI_TRY(vshi_mesh_check_data(&meshes[m], m, error));
-        if (meshes[m].uvs == NULL && meshes[m].triangle_count > 0) {
-            return vshi_fail(error, VSH_ERROR_INPUT, "%s has no lightmap UVs",
-                             vshi_mesh_label(&meshes[m], m).text);
-        }
         c.triangles += meshes[m].triangle_count;
     }
     if (c.triangles > UINT32_MAX / 3 - 1) {
         return vshi_fail(error, VSH_ERROR_LIMIT, "closeness of charts: %zu triangles, at most %u",
                          c.triangles, UINT32_MAX / 3 - 1);
     }
-    vshi_closeness all = {.gap = 1.0};
-    const vsh_result result = find(&c, &all, error);
-    *found = all;
-    return result;
+    *found = (vshi_closeness){.gap = 1.0};
+    return find(&c, found, error);
 }

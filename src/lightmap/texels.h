@@ -230,7 +230,7 @@ typedef struct vshi_closeness {
 } vshi_closeness;
 
 /* Measures a receiver's charts at a size. A chart is a set of triangles connected by edges in space and in
- * the UVs. Errors: VSH_ERROR_ARGUMENT (sizes, run), VSH_ERROR_INPUT (no UVs, and as vsh_mesh_check()),
- * VSH_ERROR_LIMIT (run->memory_limit; 2^32 / 3 triangles), VSH_ERROR_MEMORY. */
+ * the UVs. The meshes are those of charts that were created. Errors: VSH_ERROR_LIMIT (run->memory_limit; 2^32
+ * / 3 triangles), VSH_ERROR_MEMORY. */
 vsh_result vshi_charts_closeness(const vsh_mesh *meshes, size_t mesh_count, int32_t width, int32_t height,
                                  const vsh_run *run, vshi_closeness *found, vsh_error *error);

@@ -479,12 +479,10 @@ static vsh_result trace_casters(const selection *of, const vsh_run *run, vshi_tr
     const vshi_array arrays[] = {VSHI_ARRAY(t.meshes, meshes), VSHI_ARRAY(t.surfaces, meshes),
                                  VSHI_ARRAY(t.sdfs, sdfs), VSHI_ARRAY(t.places, sdfs),
                                  VSHI_ARRAY(t.balls, balls)};
-    vsh_run full;
     vsh_result result;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "casters", error));
     for (size_t i = 0; i < casters; ++i) {
-        VSHI_TRY_DONE(is_selected(of, i) ? add_traced(of, i, &full, &t, error) : VSH_OK);
+        VSHI_TRY_DONE(is_selected(of, i) ? add_traced(of, i, run, &t, error) : VSH_OK);
     }
     if (t.sdf_count > 0) {
         VSHI_TRY_DONE(vshi_solids_create(t.sdfs, t.places[0], t.sdf_count, &made, error));

@@ -16,8 +16,8 @@
  * (world units, ≥ 0). Points and spots get VSH_FALLOFF_INVERSE_SQUARE; ranges are ignored. Colours are colour
  * × intensity. In names, characters that a light's name cannot have become _; lights without a name are
  * "light", and later lights of the same name end in _2, _3 … `unit` as in vsh_scene. Free *lights with
- * vsh_lights_free(); it is NULL if *count is 0. Errors: VSH_ERROR_ARGUMENT (NULL, a number out of range, a
- * light beyond the range of positions), VSH_ERROR_MEMORY. */
+ * vsh_lights_free(); it is NULL if *count is 0. Errors: VSH_ERROR_ARGUMENT (a number out of range, a light
+ * beyond the range of positions), VSH_ERROR_MEMORY. */
 vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                   vsh_light **lights, size_t *count, vsh_error *error);
 

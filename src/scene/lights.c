@@ -215,10 +215,6 @@ static vsh_light make_light(const vshi_model_light *given, double angle, double 
 
 vsh_result vshi_lights_from_model(const vsh_model *model, double angle, double radius, double unit,
                                   vsh_light **lights, size_t *count, vsh_error *error) {
-    VSHI_MAKES(lights);
-    VSHI_NEEDS(count);
-    *count = 0;
-    VSHI_NEEDS(model);
     if (!(unit >= 0.0 && isfinite(unit))) {
         return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_lights_from_model: unit is %g, expected at least 0",
                          unit);

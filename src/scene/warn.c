@@ -28,8 +28,9 @@ static void warn_close(const vshi_target *target, const vsh_uv_report *reports, 
     vsh_run silent = *run;
     silent.warning = NULL;
     vshi_closeness close;
-    if (vshi_charts_closeness(target->lightmap->meshes, target->lightmap->mesh_count, receiver->width,
-                              receiver->height, &silent, &close, NULL) != VSH_OK ||
+    const vshi_charts *sorted = &target->charts->sorted;
+    if (vshi_charts_closeness(sorted->meshes, sorted->mesh_count, receiver->width, receiver->height, &silent,
+                              &close, NULL) != VSH_OK ||
         close.texels == 0) {
         return; /* a failure is not worth an error: this is only a hint */
     }

@@ -231,7 +231,7 @@ vsh_result vsh_occluders_create(const vsh_mesh *meshes, size_t mesh_count,
     }
     if (traced) {
         const double start = vshi_seconds();
-        VSHI_TRY_DONE(vshi_triangles_create(set.meshes, mesh_count, NULL, run, &own.triangles, error));
+        VSHI_TRY_DONE(vshi_triangles_create(set.meshes, mesh_count, NULL, &resolved, &own.triangles, error));
         own.triangles_s = vshi_seconds() - start;
     }
     if (own.field == NULL) {

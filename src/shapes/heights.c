@@ -344,13 +344,11 @@ vsh_result vshi_heights_create(const vsh_heights_source *source, const vsh_run *
                                vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(heights);
-    vsh_run full;
     checked_heights t;
     double scale = 1.0;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(check_source(source, "vshi_heights_create", &t, error));
     VSHI_TRY(vshi_similarity_check(source->transform, t.name, &scale, error));
-    VSHI_TRY(vshi_check_limit(&full, (double)t.samples * sizeof(float), t.name, error));
+    VSHI_TRY(vshi_check_limit(run, (double)t.samples * sizeof(float), t.name, error));
     vshi_heights *made;
     const size_t bytes = sizeof *made + t.samples * sizeof made->height[0];
     VSHI_TRY(vshi_allocate((void **)&made, 1, bytes, t.name, error));

@@ -13,7 +13,7 @@
 typedef struct vshi_heights vshi_heights;
 
 /* Copies the heights. Free the result with vshi_heights_free(). Errors:
- * - VSH_ERROR_ARGUMENT: source, values or heights NULL, sizes out of range, run. A transform that is not
+ * - VSH_ERROR_ARGUMENT: source, values or heights NULL, sizes out of range. A transform that is not
  *   finite, shears, scales unevenly or flattens;
  * - VSH_ERROR_INPUT: a value that is not finite, or not once scaled: the message gives its row and column;
  * - VSH_ERROR_LIMIT: run->memory_limit (4 bytes a sample);

@@ -647,21 +647,16 @@ vsh_result vshi_outline_unite(const vshi_outline_instance *instances, size_t ins
                               const vsh_run *run, vsh_outline **outline, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(outline);
-    if (instances == NULL || instance_count == 0) {
-        return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_outline_unite: no instances");
-    }
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     static const double identity[6] = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0};
-    vshi_contours contours = {.run = &full, .error = error};
+    vshi_contours contours = {.run = run, .error = error};
     for (size_t i = 0; i < instance_count; ++i) {
         const vsh_outline *o = instances[i].outline;
         const double *m = instances[i].transform != NULL ? instances[i].transform : identity;
         const double determinant = m[0] * m[4] - m[1] * m[3];
-        if (o == NULL || !isfinite(determinant) || determinant == 0.0 || !isfinite(m[2]) || !isfinite(m[5])) {
+        if (!isfinite(determinant) || determinant == 0.0 || !isfinite(m[2]) || !isfinite(m[5])) {
             vshi_contours_free(&contours);
-            return vshi_fail(error, VSH_ERROR_ARGUMENT, "vshi_outline_unite: instance %zu: %s", i,
-                             o == NULL ? "no outline" : "a transform that flattens or is not finite");
+            return vshi_fail(error, VSH_ERROR_ARGUMENT,
+                             "instance %zu: a transform that flattens or is not finite", i);
         }
         for (size_t c = 0; c < o->contour_count; ++c) {
             /* a mirrored contour is reversed, so that its area winds the same way as the others */

@@ -16,7 +16,7 @@ VSH_BEGIN_C
  * cross the threshold (marching squares: Lorensen and Cline, 1987, in the plane). This finds the edges of
  * anti-aliased masks to 0.09 pixels. The area ends at the image's edge. Stored values count, without a
  * transfer curve. Errors, beyond those of vsh_image_read():
- * - VSH_ERROR_ARGUMENT: path or outline NULL, options out of range, run;
+ * - VSH_ERROR_ARGUMENT: path or outline NULL, options out of range;
  * - VSH_ERROR_INPUT: no channel of that name, a pixel that is not finite, nothing solid;
  * - VSH_ERROR_LIMIT: run->memory_limit, more than 2^31 points;
  * - VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
@@ -45,9 +45,9 @@ typedef struct vshi_outline_instance {
                                 scale unevenly, but not flatten; NULL: identity */
 } vshi_outline_instance;
 
-/* The union of outlines. Errors: VSH_ERROR_ARGUMENT (no instances, an outline that is NULL, a transform that
- * is not finite or flattens, run), VSH_ERROR_INPUT (a point moved beyond 1e15), VSH_ERROR_LIMIT
- * (run->memory_limit, more than 2^31 points), VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
+/* The union of one outline or more. Errors: VSH_ERROR_ARGUMENT (a transform that is not finite or flattens),
+ * VSH_ERROR_INPUT (a point moved beyond 1e15), VSH_ERROR_LIMIT (run->memory_limit, more than 2^31 points),
+ * VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. */
 vsh_result vshi_outline_unite(const vshi_outline_instance *instances, size_t instance_count,
                               const vsh_run *run, vsh_outline **outline, vsh_error *error);
 

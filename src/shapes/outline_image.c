@@ -300,14 +300,12 @@ vsh_result vshi_outline_from_image(const char *path, const vsh_mask_options *opt
     VSHI_MAKES(outline);
     VSHI_NEEDS(path);
     vsh_mask_options full = vsh_mask_options_default();
-    vsh_run full_run;
     vsh_image_file *file;
     VSHI_TRY(vshi_options_resolve(options, &full, sizeof full, "vsh_mask_options", error));
     VSHI_TRY(check_options(&full, error));
-    VSHI_TRY(vshi_run_resolve(run, &full_run, error));
-    VSHI_TRY(vsh_image_read(path, &full_run, &file, error));
+    VSHI_TRY(vsh_image_read(path, run, &file, error));
     const vsh_image image = vsh_image_view(file);
-    const vsh_result result = trace_image(&image, path, &full, &full_run, outline, error);
+    const vsh_result result = trace_image(&image, path, &full, run, outline, error);
     vsh_image_free(file);
     return result;
 }

@@ -228,12 +228,10 @@ vsh_result vshi_spheres_create(const double *spheres, size_t count, const double
     VSHI_FLOATS;
     VSHI_MAKES(made);
     VSHI_NEEDS_OF(count, spheres);
-    vsh_run full;
     double scale = 1.0;
     vshi_spheres *own = NULL;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     VSHI_TRY(check(spheres, count, transform, &scale, error));
-    VSHI_TRY(vshi_check_limit(&full, 100.0 * (double)count, "spheres", error));
+    VSHI_TRY(vshi_check_limit(run, 100.0 * (double)count, "spheres", error));
     VSHI_TRY(vshi_allocate((void **)&own, 1, sizeof *own, "spheres", error));
     own->info.count = count;
     const vsh_result result = make(own, spheres, transform, scale, error);
@@ -512,21 +510,18 @@ vsh_result vshi_spheres_read(const char *path, const vsh_run *run, double **sphe
                              vsh_error *error) {
     VSHI_FLOATS;
     VSHI_NUMBERS;
-    VSHI_MAKES(spheres);
-    VSHI_NEEDS_BOTH(path, count);
+    *spheres = NULL;
     *count = 0;
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     vshi_source from;
     vshi_job *job = NULL;
     list l = {NULL, 0, 0};
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_source_open(path, MOST_BYTES, &from, error));
-    from.job = job = vshi_job_begin(&full, "load", (size_t)from.size + 1);
+    from.job = job = vshi_job_begin(run, "load", (size_t)from.size + 1);
     if (job == NULL) {
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path));
     }
-    VSHI_TRY_DONE(read_rows(&from, &full, &l, error));
+    VSHI_TRY_DONE(read_rows(&from, run, &l, error));
     if (vshi_job_advance(job, 1)) {
         VSHI_TRY_DONE(vshi_job_fail_cancelled(job, error));
     }

@@ -9,7 +9,7 @@ typedef struct vshi_spheres vshi_spheres;
 
 /* Copies spheres [count][4]: x, y, z, radius. Free the result with vshi_spheres_free(). `transform` ([12],
  * local to world, three rows of four) may rotate, translate, mirror and scale evenly; NULL: identity. Errors:
- * - VSH_ERROR_ARGUMENT: any other transform; run;
+ * - VSH_ERROR_ARGUMENT: any other transform;
  * - VSH_ERROR_INPUT: no spheres. A number that is not finite or beyond ±1e15, or a radius that is not above
  *   0: the message gives the sphere's number from 0;
  * - VSH_ERROR_LIMIT: more than 2^30 spheres. run->memory_limit, with about 100 bytes a sphere;
@@ -30,7 +30,6 @@ void vshi_spheres_get_info(const vshi_spheres *spheres, vshi_spheres_info *info)
 /* Reads spheres from a CSV file. A row holds x, y, z and radius between commas, semicolons, tabs or blanks.
  * Numbers have a decimal point and may be in quotes. Empty rows, rows that begin with #, and a first row of
  * names do not count. *spheres is [*count][4]; free it with free(). Errors:
- * - VSH_ERROR_ARGUMENT: run;
  * - VSH_ERROR_READ: no such file, no permission, no regular file;
  * - VSH_ERROR_INPUT: no spheres, or a bad row: the message gives its number in the file;
  * - VSH_ERROR_LIMIT: run->memory_limit, a file of more than 16 GiB;

@@ -626,28 +626,25 @@ vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi
                                  const vsh_run *run, vshi_triangles **triangles, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(triangles);
-    VSHI_NEEDS_OF(mesh_count, meshes);
-    vsh_run full;
-    VSHI_TRY(vshi_run_resolve(run, &full, error));
     vshi_mesh_set set;
     vshi_triangles *made = NULL;
     vshi_job *job = NULL;
     vsh_result result;
     VSHI_TRY_DONE(vshi_mesh_set_create(meshes, mesh_count, &set, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&made, 1, sizeof *made, "triangles", error));
-    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, &full, error));
+    VSHI_TRY_DONE(vshi_mesh_set_solve(&set, run, error));
     VSHI_TRY_DONE(find_terrains(made, &set, error));
     double bytes = 0.0;
     for (size_t m = 0; m < mesh_count; ++m) {
         bytes += 12.0 * (double)set.meshes[m].vertex_count +
                  (made->cells[m] > 0 ? QUAD_BYTES : TRIANGLE_BYTES) * (double)count_triangles(made, &set, m);
     }
-    VSHI_TRY_DONE(vshi_check_limit(&full, bytes, "triangles", error));
-    VSHI_TRY_DONE(create_sieves(made, set.meshes, set.count, &full, bytes, error));
-    made->limit = full.memory_limit;
+    VSHI_TRY_DONE(vshi_check_limit(run, bytes, "triangles", error));
+    VSHI_TRY_DONE(create_sieves(made, set.meshes, set.count, run, bytes, error));
+    made->limit = run->memory_limit;
     made->solids = solids;
     measure(made, set.meshes, set.count);
-    job = vshi_job_begin(&full, "triangles", 1);
+    job = vshi_job_begin(run, "triangles", 1);
     if (job == NULL) {
         result = vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
         goto done;

@@ -116,7 +116,7 @@ static vsh_result check(const vsh_sdf *sdfs, const double *transforms, size_t co
     *nodes = 0;
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY(vshi_sdf_check(&sdfs[i], error));
-        if (transforms != NULL && !(vshi_similarity_scale(transforms + 12 * i) > 0.0)) {
+        if (!(vshi_similarity_scale(transforms + 12 * i) > 0.0)) {
             return vshi_fail(error, VSH_ERROR_INPUT,
                              "solid %zu: the transform of an sdf must neither shear nor scale unevenly", i);
         }
@@ -129,7 +129,6 @@ vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, siz
                               vshi_solids **solids, vsh_error *error) {
     VSHI_FLOATS;
     VSHI_MAKES(solids);
-    VSHI_NEEDS_OF(count, sdfs);
     size_t nodes;
     vshi_solids *made;
     vsh_result result;
@@ -139,8 +138,7 @@ vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, siz
     VSHI_TRY_DONE(vshi_allocate((void **)&made->members, nodes, sizeof *made->members, "solids", error));
     vshi_empty_box(made->low, made->high);
     for (size_t i = 0; i < count; ++i) {
-        const double *transform = transforms != NULL ? transforms + 12 * i : vshi_identity;
-        VSHI_TRY_DONE(add_tree(made, &sdfs[i], transform, error));
+        VSHI_TRY_DONE(add_tree(made, &sdfs[i], transforms + 12 * i, error));
     }
     made->size = made->low[0] <= made->high[0]
                      ? vshi_length(vshi_sub(vshi_vec_of(made->high), vshi_vec_of(made->low)))

@@ -14,9 +14,8 @@
 typedef struct vshi_solids vshi_solids;
 
 /* Copies `count` trees, each under its transform (transforms: [count][12], local to world, three rows of
- * four; NULL: none is moved). Errors: VSH_ERROR_ARGUMENT (solids NULL, sdfs NULL with a count above 0),
- * VSH_ERROR_INPUT (as vshi_sdf_check(); a transform that shears or scales unevenly), VSH_ERROR_MEMORY. Free
- * the result with vshi_solids_free(). */
+ * four). Errors: VSH_ERROR_INPUT (as vshi_sdf_check(); a transform that shears or scales unevenly),
+ * VSH_ERROR_MEMORY. Free the result with vshi_solids_free(). */
 vsh_result vshi_solids_create(const vsh_sdf *sdfs, const double *transforms, size_t count,
                               vshi_solids **solids, vsh_error *error);
 void vshi_solids_free(vshi_solids *solids); /* NULL does nothing */
@@ -52,10 +51,10 @@ vshi_cone_state vshi_solids_cone(const vshi_solids *solids, const double origin[
 typedef struct vshi_triangles vshi_triangles;
 
 /* Copies the meshes' triangles, transforms applied; both sides of a triangle block. `solids`, which may be
- * NULL, are part of the scene. The result owns them, but not after an error. The first call
- * loads Embree, which stays loaded. Errors: VSH_ERROR_UNSUPPORTED (Embree cannot be loaded), VSH_ERROR_INPUT
- * (as vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the result with
- * vshi_triangles_free(). */
+ * NULL, are part of the scene. The result owns them, but not after an error. `run` is resolved. The first
+ * call loads Embree, which stays loaded. Errors: VSH_ERROR_UNSUPPORTED (Embree cannot be loaded),
+ * VSH_ERROR_INPUT (as vsh_mesh_check()), VSH_ERROR_LIMIT, VSH_ERROR_MEMORY, VSH_ERROR_CANCELLED. Free the
+ * result with vshi_triangles_free(). */
 vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi_solids *solids,
                                  const vsh_run *run, vshi_triangles **triangles, vsh_error *error);
 void vshi_triangles_free(vshi_triangles *triangles); /* NULL does nothing */

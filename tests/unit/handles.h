@@ -84,8 +84,9 @@ static inline float distance_at(const vsh_field *field, const double position[3]
 /* --- triangles and their texels */
 
 static inline vshi_triangles *triangles_from(const vsh_mesh *meshes, size_t count) {
+    const vsh_run run = vsh_run_default();
     vshi_triangles *triangles = NULL;
-    assert_ok(vshi_triangles_create(meshes, count, NULL, NULL, &triangles, &failure));
+    assert_ok(vshi_triangles_create(meshes, count, NULL, &run, &triangles, &failure));
     return triangles;
 }
 

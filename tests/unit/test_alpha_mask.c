@@ -297,11 +297,12 @@ TEST(bad_masks_are_refused) {
     bad[4].uv_transform[5] = NAN;
     bad[5].alpha_cutoff = -0.1;
     bad[6].base_alpha = 1.5;
+    const vsh_run run = vsh_run_default();
     for (int i = 0; i < 8; ++i) {
         c->mesh.mask = &bad[i];
         c->mesh.mask_uvs = i < 7 ? c->uvs : NULL;
         vshi_triangles *triangles = NULL;
-        assert_fails(vshi_triangles_create(&c->mesh, 1, NULL, NULL, &triangles, &failure), VSH_ERROR_ARGUMENT,
+        assert_fails(vshi_triangles_create(&c->mesh, 1, NULL, &run, &triangles, &failure), VSH_ERROR_ARGUMENT,
                      "'card'");
         assert_null(triangles);
     }

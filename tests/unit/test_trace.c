@@ -32,7 +32,8 @@ static casters casters_of_mesh(const vsh_mesh *meshes, size_t count) {
 static casters casters_of_tree(const vsh_sdf_node *nodes, size_t count, const double *transform) {
     const vsh_sdf sdf = {nodes, count};
     casters c = {NULL, NULL};
-    assert_ok(vshi_solids_create(&sdf, transform, 1, &c.solids, &failure));
+    assert_ok(
+        vshi_solids_create(&sdf, transform != NULL ? transform : vshi_identity, 1, &c.solids, &failure));
     return c;
 }
 
@@ -356,7 +357,7 @@ TEST(bad_triangles_are_refused) {
     const uint32_t wrong[3] = {0, 1, 99};
     const float corners[9] = {0.0f, 0.0f, 0.0f, 1.0f, 0.0f, 0.0f, 0.0f, 1.0f, 0.0f};
     const vsh_mesh bad = mesh_of_arrays(NULL, corners, NULL, 3, wrong, 1);
-    assert_fails(vshi_triangles_create(&bad, 1, NULL, NULL, &triangles, &failure), VSH_ERROR_INPUT, "");
+    assert_fails(vshi_triangles_create(&bad, 1, NULL, &small, &triangles, &failure), VSH_ERROR_INPUT, "");
     assert_null(triangles);
 }
 
@@ -367,5 +368,5 @@ TEST(bad_solids_are_refused) {
     vshi_solids *solids = NULL;
     assert_fails(vshi_solids_create(&sdf, uneven, 1, &solids, &failure), VSH_ERROR_INPUT, "unevenly");
     node.radius = -1.0;
-    assert_fails(vshi_solids_create(&sdf, NULL, 1, &solids, &failure), VSH_ERROR_INPUT, "radius");
+    assert_fails(vshi_solids_create(&sdf, uneven, 1, &solids, &failure), VSH_ERROR_INPUT, "radius");
 }
