@@ -86,16 +86,16 @@ int32_t vshi_job_threads(const vshi_job *job) {
     return given;
 }
 
-vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *error) {
+static vsh_result fail_cancelled(const vshi_job *job, vsh_error *error) {
     return vshi_fail(error, VSH_ERROR_CANCELLED, "%s: cancelled", job->stage);
 }
 
 vsh_result vshi_job_check(const vshi_job *job, vsh_error *error) {
-    return vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+    return vshi_job_cancelled(job) ? fail_cancelled(job, error) : VSH_OK;
 }
 
 vsh_result vshi_job_step(vshi_job *job, size_t units, vsh_error *error) {
-    return vshi_job_advance(job, units) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+    return vshi_job_advance(job, units) ? fail_cancelled(job, error) : VSH_OK;
 }
 
 /* --- loops over elements that may fail */

@@ -27,9 +27,8 @@ VSHI_SHARED bool vshi_job_cancelled(const vshi_job *job);
 /* The run's threads, 1 … 1024, or 0 for all cores; fewer, with a note, if the system refuses some. */
 VSHI_SHARED int32_t vshi_job_threads(const vshi_job *job);
 
-/* These fail with VSH_ERROR_CANCELLED, naming the stage. The first always does; the second if the job is
- * cancelled; the third advances the job, and fails if it is then cancelled. */
-VSHI_SHARED vsh_result vshi_job_fail_cancelled(const vshi_job *job, vsh_error *error);
+/* These fail with VSH_ERROR_CANCELLED, naming the stage, if the job is cancelled. The second advances it
+ * first. */
 VSHI_SHARED vsh_result vshi_job_check(const vshi_job *job, vsh_error *error);
 VSHI_SHARED vsh_result vshi_job_step(vshi_job *job, size_t units, vsh_error *error);
 

@@ -324,20 +324,16 @@ static vsh_result check_options(const vsh_compare_options *options, vsh_error *e
     return VSH_OK;
 }
 
-static vsh_result advance(vshi_job *job, vsh_error *error) {
-    return vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
-}
-
 static vsh_result measure_all(const vshi_pair *pair, const vsh_compare_options *options, vshi_job *job,
                               void *scratch, vsh_measures *m, vsh_error *error) {
     VSHI_TRY(measure_values(pair, m, error));
-    VSHI_TRY(advance(job, error));
+    VSHI_TRY(vshi_job_step(job, 1, error));
     vshi_measure_shift(pair, scratch, m);
-    VSHI_TRY(advance(job, error));
+    VSHI_TRY(vshi_job_step(job, 1, error));
     VSHI_TRY(vshi_measure_penumbrae(pair, options->noise, m, error));
-    VSHI_TRY(advance(job, error));
+    VSHI_TRY(vshi_job_step(job, 1, error));
     measure_regions(pair, options, scratch, m);
-    return advance(job, error);
+    return vshi_job_step(job, 1, error);
 }
 
 vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *options, const vsh_run *run,

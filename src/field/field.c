@@ -78,9 +78,7 @@ static vsh_result derive_levels(vsh_field *f, double reach, double held, const v
         }
         VSHI_TRY(
             vshi_level_derive(f, below, (vshi_field_budget){run, held + vshi_field_bytes(f)}, job, error));
-        if (vshi_job_advance(job, units)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
+        VSHI_TRY(vshi_job_step(job, units, error));
     }
     return VSH_OK;
 }

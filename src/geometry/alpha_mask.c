@@ -304,11 +304,9 @@ static vsh_result cut_all(cutting *c, vsh_error *error) {
         if (vshi_mesh_degenerate(c->mesh, i) || cut_triangle(c, i)) {
             continue;
         }
-        return vshi_job_cancelled(c->job)
-                   ? vshi_job_fail_cancelled(c->job, error)
-                   : vshi_fail(error, VSH_ERROR_LIMIT,
-                               "%s: its alpha mask leaves more than %.0f pieces of %.3g",
-                               vshi_mesh_label(c->mesh, VSHI_MESH_ALONE).text, c->most, c->size);
+        VSHI_TRY(vshi_job_check(c->job, error));
+        return vshi_fail(error, VSH_ERROR_LIMIT, "%s: its alpha mask leaves more than %.0f pieces of %.3g",
+                         vshi_mesh_label(c->mesh, VSHI_MESH_ALONE).text, c->most, c->size);
     }
     return VSH_OK;
 }

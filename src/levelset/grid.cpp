@@ -150,9 +150,7 @@ void Stage::reach(double fraction) {
 }
 
 void Stage::check() {
-    if (cancelled()) {
-        require(vshi_job_fail_cancelled, job);
-    }
+    require(vshi_job_step, job, size_t(0));
 }
 
 namespace {

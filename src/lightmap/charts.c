@@ -111,9 +111,7 @@ static vsh_result sort_triangles(vshi_charts *charts, bool fill, vshi_job *job, 
     for (size_t m = 0; m < charts->mesh_count; ++m) {
         const vsh_mesh *mesh = &charts->meshes[m];
         for (size_t i = 0; i < mesh->triangle_count; ++i) {
-            if (i % POLL_TRIANGLES == 0 && vshi_job_advance(job, 0)) {
-                return vshi_job_fail_cancelled(job, error);
-            }
+            VSHI_TRY(i % POLL_TRIANGLES == 0 ? vshi_job_step(job, 0, error) : VSH_OK);
             vshi_uv_triangle triangle;
             const bool used = vshi_charts_triangle(charts, m, i, &triangle);
             if (!fill) {
@@ -282,7 +280,7 @@ static vsh_result find_sheets(vsh_charts *charts, vshi_mesh_set *set, vshi_job *
         for (size_t i = 0; i < set->meshes[m].triangle_count; ++i) {
             charts->sheet[first[m] + i] = sides[i] == VSHI_SIDE_SHEET;
         }
-        VSHI_TRY(vshi_job_advance(job, 0) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
+        VSHI_TRY(vshi_job_step(job, 0, error));
     }
     return VSH_OK;
 }

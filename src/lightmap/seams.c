@@ -127,9 +127,7 @@ static lookup find_lookup(const making *m, const vshi_seam *seam, int side, size
 static vsh_result mark(making *m, size_t *places, vsh_error *error) {
     *places = 0;
     for (size_t i = 0; i < m->seams->count; ++i) {
-        if (i % POLL_SEAMS == 0 && vshi_job_advance(m->job, 0)) {
-            return vshi_job_fail_cancelled(m->job, error);
-        }
+        VSHI_TRY(i % POLL_SEAMS == 0 ? vshi_job_step(m->job, 0, error) : VSH_OK);
         const vshi_seam *seam = &m->seams->list[i];
         float share;
         const size_t own = places_of(seam, &share);
@@ -255,9 +253,7 @@ static vsh_result make_rows(making *m, vsh_error *error) {
         m->parent[u] = u;
     }
     for (size_t i = 0; i < m->seams->count; ++i) {
-        if (i % POLL_SEAMS == 0 && vshi_job_advance(m->job, 0)) {
-            return vshi_job_fail_cancelled(m->job, error);
-        }
+        VSHI_TRY(i % POLL_SEAMS == 0 ? vshi_job_step(m->job, 0, error) : VSH_OK);
         const vshi_seam *seam = &m->seams->list[i];
         float share;
         const size_t places = places_of(seam, &share);
@@ -683,9 +679,7 @@ static vsh_result stitch_channels(stitching *s, const vsh_run *run, vsh_error *e
         for (size_t k = 0; k < s->batch; ++k) {
             add_sums(s, &s->channels[s->begin + k]);
         }
-        if (vshi_job_advance(s->job, s->batch)) {
-            return vshi_job_fail_cancelled(s->job, error);
-        }
+        VSHI_TRY(vshi_job_step(s->job, s->batch, error));
     }
     return VSH_OK;
 }
@@ -759,7 +753,7 @@ static vsh_result stitch(stitching *s, size_t light_count, const vsh_run *run, v
     report->texels = system->unknown_count;
     vshi_seams_free(&seams);
     free_making(&m);
-    VSHI_TRY_DONE(vshi_job_advance(s->job, 1) ? vshi_job_fail_cancelled(s->job, error) : VSH_OK);
+    VSHI_TRY_DONE(vshi_job_step(s->job, 1, error));
     VSHI_TRY_DONE(stitch_channels(s, run, error));
     const double all = (double)s->channel_count * system->shares;
     report->before = all > 0.0 ? sqrt(s->square_before / all) : 0.0;

@@ -380,9 +380,7 @@ static vsh_result find_parts(finding *f, vsh_error *error) {
     }
     VSHI_TRY(list_ends(f, error));
     for (size_t i = 0; i < f->count; ++i) {
-        if (i % POLL_PARTS == 0 && vshi_job_advance(f->search->job, 0)) {
-            return vshi_job_fail_cancelled(f->search->job, error);
-        }
+        VSHI_TRY(i % POLL_PARTS == 0 ? vshi_job_step(f->search->job, 0, error) : VSH_OK);
         VSHI_TRY(cut_edge(f, f->edges[i], error));
     }
     if (!f->any_cut) {
@@ -479,9 +477,7 @@ static vsh_result compare_edges(seam_search *s, const vshi_sorted_sides *sides, 
         uint32_t ends[2];
         end = vshi_next_edge(sides, i);
         vshi_side_ends(sides->corners, sides->sorted[i], ends);
-        if (polled++ % POLL_EDGES == 0 && vshi_job_advance(s->job, 0)) {
-            return vshi_job_fail_cancelled(s->job, error);
-        }
+        VSHI_TRY(polled++ % POLL_EDGES == 0 ? vshi_job_step(s->job, 0, error) : VSH_OK);
         if (ends[0] != ends[1]) {
             VSHI_TRY(compare_sides(s, sides->sorted + i, end - i, error));
         }

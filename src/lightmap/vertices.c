@@ -141,7 +141,7 @@ static vsh_result solve(fit *f, const vsh_run *run, vsh_error *error) {
             const size_t v = sweep % 2 == 0 ? i : f->vertex_count - 1 - i;
             most = f->weld[v] == v ? fmax(most, relax(f, v)) : most;
         }
-        result = vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+        result = vshi_job_step(job, 1, error);
     }
     vshi_job_end(job);
     return result;

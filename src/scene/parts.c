@@ -462,7 +462,7 @@ static vsh_result check_sum(part_file *f, const vshi_part_front *front, const ch
         VSHI_TRY_DONE(move_bytes(f, chunk, count, error));
         sum = vshi_part_sum(sum, chunk, count);
         left -= count;
-        VSHI_TRY_DONE(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
+        VSHI_TRY_DONE(vshi_job_step(job, 1, error));
     }
     VSHI_TRY_DONE(move_bytes(f, &written, sizeof written, error));
     result = written == sum ? VSH_OK : fail_damaged(f->path, "its checksum does not match", error);
@@ -676,7 +676,7 @@ static vsh_result read_tiles(vshi_parts *parts, size_t index, const vshi_scene_p
     }
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY_DONE(move_tile(&f, page, tiles[i], error));
-        VSHI_TRY_DONE(vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK);
+        VSHI_TRY_DONE(vshi_job_step(job, 1, error));
     }
     p->at = ftello(f.file);
     parts->number = index + 1 == parts->count ? number : parts->number;

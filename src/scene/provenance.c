@@ -226,9 +226,7 @@ static vsh_result add_inputs(vsh_provenance *p, const file_list *inputs, vshi_jo
         snprintf(text, sizeof text, "sha256:%s %s", digest, vshi_path_name(path));
         snprintf(name, sizeof name, "vdbshade_input_%zu", i);
         VSHI_TRY(add(p, name, text, error));
-        if (vshi_job_advance(job, HASH_UNITS / inputs->count)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
+        VSHI_TRY(vshi_job_step(job, HASH_UNITS / inputs->count, error));
     }
     return VSH_OK;
 }

@@ -189,17 +189,15 @@ static void march_cell(border *b, int64_t i, int64_t k) {
     }
 }
 
-static bool march(border *b, vshi_job *job) {
+static vsh_result march(border *b, vshi_job *job, vsh_error *error) {
     b->step_count = 0;
     for (int64_t k = 0; k + 1 < b->rows; ++k) {
         for (int64_t i = 0; i + 1 < b->columns; ++i) {
             march_cell(b, i, k);
         }
-        if (vshi_job_advance(job, 1)) {
-            return false;
-        }
+        VSHI_TRY(vshi_job_step(job, 1, error));
     }
-    return true;
+    return VSH_OK;
 }
 
 static int by_from(const void *a, const void *b) {
@@ -232,11 +230,11 @@ static vsh_result trace(border *b, const char *path, double held, const vsh_run 
         return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
     }
     vsh_result result;
-    VSHI_TRY_DONE(march(b, job) ? VSH_OK : vshi_job_fail_cancelled(job, error));
+    VSHI_TRY_DONE(march(b, job, error));
     VSHI_TRY_DONE(vshi_check_limit(run, held + (double)b->step_count * sizeof(step), path, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&b->steps, b->step_count, sizeof(step), path, error));
     if (b->steps != NULL) {
-        VSHI_TRY_DONE(march(b, job) ? VSH_OK : vshi_job_fail_cancelled(job, error));
+        VSHI_TRY_DONE(march(b, job, error));
         join_steps(b, &contours);
     }
 done:

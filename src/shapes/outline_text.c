@@ -224,9 +224,7 @@ static vsh_result draw_text(layout *l, const char *text, const vsh_text_options 
         }
         VSHI_TRY(lay_out_line(l, line, end, true, error));
         l->y -= options->line_spacing * line_height(l);
-        if (vshi_job_advance(job, size)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
+        VSHI_TRY(vshi_job_step(job, size, error));
         line = next;
     }
     return VSH_OK;

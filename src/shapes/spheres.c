@@ -522,9 +522,7 @@ vsh_result vshi_spheres_read(const char *path, const vsh_run *run, double **sphe
         VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path));
     }
     VSHI_TRY_DONE(read_rows(&from, run, &l, error));
-    if (vshi_job_advance(job, 1)) {
-        VSHI_TRY_DONE(vshi_job_fail_cancelled(job, error));
-    }
+    VSHI_TRY_DONE(vshi_job_step(job, 1, error));
     *spheres = l.values[0];
     *count = l.count;
     l.values = NULL;

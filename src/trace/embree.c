@@ -502,9 +502,7 @@ static vsh_result fail_by(const vshi_triangles *triangles, enum RTCError code, v
         return vshi_fail(error, VSH_ERROR_LIMIT, "triangles: the memory limit of %.0f MB is passed",
                          (double)triangles->limit / 1e6);
     }
-    if (vshi_job_cancelled(job)) {
-        return vshi_job_fail_cancelled(job, error);
-    }
+    VSHI_TRY(vshi_job_check(job, error));
     if (code == RTC_ERROR_OUT_OF_MEMORY || code == RTC_ERROR_NONE) { /* Embree loses some reasons */
         return vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
     }
@@ -566,15 +564,13 @@ static vsh_result build(vshi_triangles *triangles, const vshi_mesh_set *set, vsh
         if (!attach_mesh(triangles, set, m)) {
             return fail_build(triangles, job, error);
         }
-        if (vshi_job_advance(job, 0)) {
-            return vshi_job_fail_cancelled(job, error);
-        }
+        VSHI_TRY(vshi_job_step(job, 0, error));
     }
     if (triangles->solids != NULL && !attach_solids(triangles, (unsigned)set->count)) {
         return fail_build(triangles, job, error);
     }
     VSHI_TRY(build_tree(triangles, job, error));
-    return vshi_job_advance(job, 1) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+    return vshi_job_step(job, 1, error);
 }
 
 static vsh_result build_quads(vshi_triangles *triangles, const vshi_quads *quads, vshi_job *job,
@@ -649,7 +645,8 @@ vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi
         result = vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
         goto done;
     }
-    result = vshi_job_cancelled(job) ? vshi_job_fail_cancelled(job, error) : build(made, &set, job, error);
+    VSHI_TRY_DONE(vshi_job_check(job, error));
+    result = build(made, &set, job, error);
 done:
     vshi_job_end(job);
     vshi_mesh_set_free(&set);

@@ -229,9 +229,7 @@ static vsh_result grow(growing *w, vsh_error *error) {
         add_to_chart(w, next.what, next.by);
         c->axis = vshi_unit(c->sum);
         VSHI_TRY(push_around(w, next.what, next.by, error));
-        if (++w->added % CHUNK == 0 && vshi_job_advance(w->job, 0)) {
-            return vshi_job_fail_cancelled(w->job, error);
-        }
+        VSHI_TRY(++w->added % CHUNK == 0 ? vshi_job_step(w->job, 0, error) : VSH_OK);
     }
     return VSH_OK;
 }

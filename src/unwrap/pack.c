@@ -452,9 +452,7 @@ static vsh_result fill_page(placing *p, const uint8_t *wanted, uint32_t page, bo
                 return VSH_OK;
             }
         }
-        if (i % 64 == 0 && vshi_job_advance(p->job, 0)) {
-            return vshi_job_fail_cancelled(p->job, error);
-        }
+        VSHI_TRY(i % 64 == 0 ? vshi_job_step(p->job, 0, error) : VSH_OK);
     }
     return VSH_OK;
 }
@@ -777,9 +775,7 @@ vsh_result vshi_pack(vshi_packing *packing, vshi_pack_item *items, size_t count,
         VSHI_TRY_DONE(find_density(&s, count < MANY ? 4 : 2, error));
     }
     restore_best(&s);
-    if (vshi_job_advance(job, units - s.reported)) {
-        result = vshi_job_fail_cancelled(job, error);
-    }
+    result = vshi_job_step(job, units - s.reported, error);
 done:
     placing_free(&s.placing);
     free(s.best);

@@ -588,7 +588,7 @@ vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_unwrap_options *op
     VSHI_TRY_DONE(lay_out_all(&m, error));
     VSHI_TRY_DONE(join_all(&m, error));
     VSHI_TRY_DONE(vshi_parallel_each(m.job, shapes->count, 1, 0, straighten_shape, &m, error));
-    result = vshi_job_cancelled(m.job) ? vshi_job_fail_cancelled(m.job, error) : VSH_OK;
+    result = vshi_job_check(m.job, error);
 done:
     for (size_t i = 0; i < shapes->count; ++i) {
         merging_free(&m.charting[i].merging);

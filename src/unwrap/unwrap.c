@@ -229,8 +229,8 @@ static vsh_result pack_alike(work *w, group *g, vsh_error *error) {
         w->items[g->first + i].at = w->items[as->first + i].at;
         w->items[g->first + i].at.page -= (uint32_t)as->page;
     }
-    return vshi_job_advance(w->job, UNITS) ? vshi_job_fail_cancelled(w->job, error)
-                                           : add_pages(w, g, &packing, error);
+    VSHI_TRY(vshi_job_step(w->job, UNITS, error));
+    return add_pages(w, g, &packing, error);
 }
 
 /* --- pages that shrink */

@@ -82,7 +82,7 @@ static vsh_result advance(const page *p, vshi_job *job, size_t units, vsh_error 
     if (reason != 0) {
         return vshi_fail(error, VSH_ERROR_WRITE, "%s: could not be written: %s", p->path, strerror(reason));
     }
-    return vshi_job_advance(job, units) ? vshi_job_fail_cancelled(job, error) : VSH_OK;
+    return vshi_job_step(job, units, error);
 }
 
 /* --- a model: the file itself if the page's script can read it, else its triangles as a GLB */

@@ -125,9 +125,7 @@ static vsh_result list_places(vshi_lit_work *work, vsh_error *error) {
 
 static vsh_result decode_all(vshi_lit_work *work, vsh_error *error) {
     for (size_t i = 0; i < work->dracos.count; ++i) {
-        if (vshi_job_cancelled(work->gltf.job)) {
-            return vshi_job_fail_cancelled(work->gltf.job, error);
-        }
+        VSHI_TRY(vshi_job_check(work->gltf.job, error));
         VSHI_TRY(decode_primitive(work, &work->dracos.list[i], error));
     }
     return VSH_OK;

@@ -260,8 +260,8 @@ static vsh_result add_all(maker *m, json_t *nodes, vsh_error *error) {
                               memcmp(m->meshes[end].transform, of->transform, sizeof vshi_identity) == 0;) {
             ++end;
         }
-        VSHI_TRY(vshi_job_advance(gltf->job, end - first) ? vshi_job_fail_cancelled(gltf->job, error)
-                                                          : add_node(m, first, end, nodes, error));
+        VSHI_TRY(vshi_job_step(gltf->job, end - first, error));
+        VSHI_TRY(add_node(m, first, end, nodes, error));
     }
     return VSH_OK;
 }

@@ -141,9 +141,7 @@ vsh_result vshi_lit_add_images(vshi_lit_work *work, bool embed, vshi_lit_besides
     VSHI_TRY(vshi_gltf_allocate(&work->gltf, (void **)&besides->list, options->image_count,
                                 sizeof *besides->list, error));
     for (size_t i = 0; i < options->image_count; ++i) {
-        if (vshi_job_cancelled(work->gltf.job)) {
-            return vshi_job_fail_cancelled(work->gltf.job, error);
-        }
+        VSHI_TRY(vshi_job_check(work->gltf.job, error));
         vshi_lit_beside beside;
         const vsh_result result = add_image(work, &options->images[i], embed, &sampler, &beside, error);
         if (result == VSH_OK && !embed) {

@@ -251,7 +251,7 @@ static vsh_result expand(vshi_lit_work *work, const uses *all, size_t first, siz
         const size_t mesh = has && all->list[next].lit ? all->list[next].made : of->mesh;
         next += has;
         add_instance(work, node, of->node, i, mesh, values, children);
-        result = vshi_job_cancelled(gltf->job) ? vshi_job_fail_cancelled(gltf->job, error) : VSH_OK;
+        result = vshi_job_check(gltf->job, error);
     }
     for (int k = 0; k < VSHI_GLTF_PARTS; ++k) {
         free(values[k]);
@@ -286,9 +286,7 @@ static vsh_result set_mesh(vshi_lit_work *work, const uses *all, size_t first, s
 static vsh_result make_all(vshi_lit_work *work, uses *all, vsh_error *error) {
     vshi_gltf *gltf = &work->gltf;
     for (size_t i = 0; i < all->count; ++i) {
-        if (vshi_job_advance(gltf->job, all->list[i].count)) {
-            return vshi_job_fail_cancelled(gltf->job, error);
-        }
+        VSHI_TRY(vshi_job_step(gltf->job, all->list[i].count, error));
         if (all->list[i].lit) {
             VSHI_TRY(make_mesh(work, all, &all->list[i], error));
         }

@@ -574,9 +574,7 @@ static vsh_result write_obj(const vshi_lit_work *work, const char *mtl, FILE *to
         fprintf(to, "mtllib %s\n", mtl);
     }
     for (size_t i = 0; i < vsh_model_mesh_count(work->model); ++i) {
-        if (vshi_job_advance(work->gltf.job, 1)) {
-            return vshi_job_fail_cancelled(work->gltf.job, error);
-        }
+        VSHI_TRY(vshi_job_step(work->gltf.job, 1, error));
         const uint32_t object = m.mesh.object;
         open_mesh(work, i, &m);
         write_names(to, &m.mesh, object != 0 && object == m.mesh.object, i);
@@ -692,8 +690,8 @@ vsh_result vshi_lit_write_files(vshi_lit_work *work, const vshi_lit_besides *bes
         VSHI_TRY_DONE(vshi_lit_begin_stream(file, w.paths[i], error));
         VSHI_TRY_DONE(vshi_lit_end_stream(file, write_content(&w, i, file->to, error), error));
     }
-    result = vshi_job_cancelled(work->gltf.job) ? vshi_job_fail_cancelled(work->gltf.job, error)
-                                                : vshi_outputs_commit(w.outputs, w.file_count, error);
+    VSHI_TRY_DONE(vshi_job_check(work->gltf.job, error));
+    result = vshi_outputs_commit(w.outputs, w.file_count, error);
 done:
     for (size_t i = 0; i < w.file_count; ++i) {
         vshi_output_abandon(&w.files[i].output);

@@ -46,13 +46,10 @@ static vsh_result add_file(const listing *l, char *path, bool missing, vsh_error
     if (path == NULL) {
         return vshi_fail_memory(error, l->path);
     }
-    if (vshi_job_advance(l->job, 0)) {
+    const vsh_result result = vshi_job_step(l->job, 0, error);
+    if (result != VSH_OK || is_outside(l, path) || (!missing && !is_readable(path))) {
         free(path);
-        return vshi_job_fail_cancelled(l->job, error);
-    }
-    if (is_outside(l, path) || (!missing && !is_readable(path))) {
-        free(path);
-        return VSH_OK;
+        return result;
     }
     return l->add(l->user, path, error);
 }

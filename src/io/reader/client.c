@@ -534,11 +534,12 @@ vsh_result vshi_exchange_send_job(vshi_exchange *exchange, vshi_job *job, size_t
                                   vsh_error *error) {
     job_share share = {job, units, 0};
     VSHI_TRY(vshi_exchange_send(exchange, poll_job, &share, answer, error));
-    if (poll_job(&share, 1.0)) {
+    poll_job(&share, 1.0);
+    const vsh_result result = vshi_job_check(job, error);
+    if (result != VSH_OK) {
         vshi_answer_free(answer);
-        return vshi_job_fail_cancelled(job, error);
     }
-    return VSH_OK;
+    return result;
 }
 
 void vshi_answer_free(vshi_answer *answer) {
