@@ -360,8 +360,7 @@ vsh_result vsh_compare(const vsh_compared *compared, const vsh_compare_options *
     vsh_measures m;
     make_pair(compared, mask, &pair, &m);
     if (m.count > 0) {
-        job = vshi_job_begin(&full, "compare", 4);
-        VSHI_TRY_DONE(job != NULL ? VSH_OK : vshi_fail(error, VSH_ERROR_MEMORY, "comparison: out of memory"));
+        VSHI_TRY_DONE(vshi_job_open(&job, &full, "compare", 4, "comparison", error));
         VSHI_TRY_DONE(measure_all(&pair, &chosen, job, scratch, &m, error));
     }
     *measures = m;

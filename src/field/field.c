@@ -104,10 +104,8 @@ vsh_result vshi_field_create(const vsh_grid *grid, const vshi_field_options *opt
     vsh_grid_info info;
     vsh_grid_get_info(grid, &info);
     /* each level has a quarter of the work of the one below */
-    vshi_job *job = vshi_job_begin(&r, "field", 100);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "field: the system refused memory");
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_job_open(&job, &r, "field", 100, "field", error));
     vsh_result result;
     VSHI_TRY_DONE(vshi_allocate((void **)&f, 1, sizeof *f, "field", error));
     f->voxel_size = info.voxel_size;

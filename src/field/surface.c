@@ -428,10 +428,8 @@ vsh_result vshi_surface_quads_make(const vsh_field *field, double height, const 
     static const double centre[3] = {0.0, 0.0, 0.0};
     *quads = (vshi_surface_quads){.corners = NULL};
     surface_bricks surface = {.bricks = NULL};
-    vshi_job *job = vshi_job_begin(run, "surface", 2 * list_bricks(field, NULL));
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "surface: the system refused memory");
-    }
+    vshi_job *job;
+    VSHI_TRY(vshi_job_open(&job, run, "surface", 2 * list_bricks(field, NULL), "surface", error));
     vsh_result result;
     VSHI_TRY_DONE(find_surface(field, height, (vshi_field_budget){run, 0.0}, job, &surface, error));
     quads->corner_count = surface.corners[surface.brick_count];

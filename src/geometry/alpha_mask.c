@@ -320,10 +320,7 @@ vsh_result vshi_mask_pieces_cut(const vsh_mesh *mesh, double size, const vsh_run
     vsh_result result;
     *pieces = (vshi_mask_pieces){.count = 0};
     VSHI_TRY_DONE(vshi_mask_table_create(mesh->mask, run, &c.table, error));
-    c.job = vshi_job_begin(run, "masks", 2 * mesh->triangle_count);
-    if (c.job == NULL) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "alpha masks: the system refused memory"));
-    }
+    VSHI_TRY_DONE(vshi_job_open(&c.job, run, "masks", 2 * mesh->triangle_count, "alpha masks", error));
     VSHI_TRY_DONE(cut_all(&c, error));
     const size_t count = (size_t)c.count;
     VSHI_TRY_DONE(vshi_check_limit(run, find_table_bytes(mesh->mask) + PIECE_BYTES * (double)count,

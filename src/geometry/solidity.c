@@ -667,9 +667,8 @@ vsh_result vshi_solidity_create(const vsh_mesh *meshes, size_t mesh_count, const
     vsh_result result;
     VSHI_TRY_DONE(make_wholes(meshes, mesh_count, &s->wholes, error));
     VSHI_TRY_DONE(allocate(s, meshes, error));
-    job = vshi_job_begin(run, "solids", s->wholes.count);
-    result = job == NULL ? vshi_fail(error, VSH_ERROR_MEMORY, "solids: the system refused memory")
-                         : analyse(s, job, error);
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "solids", s->wholes.count, "solids", error));
+    result = analyse(s, job, error);
 done:
     vshi_job_end(job);
     if (result != VSH_OK) {

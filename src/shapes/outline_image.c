@@ -225,11 +225,9 @@ static void join_steps(border *b, vshi_contours *contours) {
 static vsh_result trace(border *b, const char *path, double held, const vsh_run *run, vsh_outline **outline,
                         vsh_error *error) {
     vshi_contours contours = {.run = run, .error = error};
-    vshi_job *job = vshi_job_begin(run, "outline", 2 * (size_t)b->rows);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    }
+    vshi_job *job;
     vsh_result result;
+    VSHI_TRY(vshi_job_open(&job, run, "outline", 2 * (size_t)b->rows, path, error));
     VSHI_TRY_DONE(march(b, job, error));
     VSHI_TRY_DONE(vshi_check_limit(run, held + (double)b->step_count * sizeof(step), path, error));
     VSHI_TRY_DONE(vshi_allocate((void **)&b->steps, b->step_count, sizeof(step), path, error));

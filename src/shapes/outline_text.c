@@ -237,9 +237,8 @@ static vsh_result draw(const char *text, const char *path, const vsh_text_option
     vshi_job *job = NULL;
     vsh_result result;
     VSHI_TRY_DONE(open_font(&l, error));
-    job = vshi_job_begin(run, "outline", strlen(text));
-    result = job != NULL ? draw_text(&l, text, options, job, error)
-                         : vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "outline", strlen(text), path, error));
+    result = draw_text(&l, text, options, job, error);
 done:
     vshi_job_end(job);
     FT_Done_FreeType(l.library); /* and the face; NULL is an error that does nothing */
@@ -296,11 +295,9 @@ static vsh_result draw_by_reader(const char *text, const char *path, const vsh_t
     enum { UNITS = 1000 };
     vshi_exchange exchange;
     vshi_answer answer;
-    vshi_job *job = vshi_job_begin(run, "outline", UNITS);
-    if (job == NULL) {
-        return vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path);
-    }
+    vshi_job *job;
     vsh_result result;
+    VSHI_TRY(vshi_job_open(&job, run, "outline", UNITS, path, error));
     VSHI_TRY_DONE(vshi_exchange_begin(&exchange, VSHI_READ_TEXT, path, run, error));
     vshi_encode_text(&exchange.encoder, text);
     vshi_encode_number(&exchange.encoder, options->height);

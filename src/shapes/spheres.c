@@ -517,10 +517,8 @@ vsh_result vshi_spheres_read(const char *path, const vsh_run *run, double **sphe
     list l = {NULL, 0, 0};
     vsh_result result = VSH_OK;
     VSHI_TRY_DONE(vshi_source_open(path, MOST_BYTES, &from, error));
-    from.job = job = vshi_job_begin(run, "load", (size_t)from.size + 1);
-    if (job == NULL) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", path));
-    }
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "load", (size_t)from.size + 1, path, error));
+    from.job = job;
     VSHI_TRY_DONE(read_rows(&from, run, &l, error));
     VSHI_TRY_DONE(vshi_job_step(job, 1, error));
     *spheres = l.values[0];

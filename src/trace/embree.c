@@ -640,11 +640,7 @@ vsh_result vshi_triangles_create(const vsh_mesh *meshes, size_t mesh_count, vshi
     made->limit = run->memory_limit;
     made->solids = solids;
     measure(made, set.meshes, set.count);
-    job = vshi_job_begin(run, "triangles", 1);
-    if (job == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "triangles: the system refused memory");
-        goto done;
-    }
+    VSHI_TRY_DONE(vshi_job_open(&job, run, "triangles", 1, "triangles", error));
     VSHI_TRY_DONE(vshi_job_check(job, error));
     result = build(made, &set, job, error);
 done:

@@ -579,11 +579,7 @@ vsh_result vshi_shapes_lay_out(vshi_shapes *shapes, const vsh_unwrap_options *op
         m.triangles += shapes->list[i].mesh->triangle_count;
     }
     VSHI_TRY(vshi_allocate((void **)&m.charting, shapes->count, sizeof *m.charting, what, error));
-    m.job = vshi_job_begin(run, "unwrap", STEPS * m.triangles);
-    if (m.job == NULL) {
-        free(m.charting);
-        return vshi_fail(error, VSH_ERROR_MEMORY, "unwrap: the system refused memory");
-    }
+    VSHI_TRY_DONE(vshi_job_open(&m.job, run, "unwrap", STEPS * m.triangles, what, error));
     VSHI_TRY_DONE(vshi_parallel_each(m.job, shapes->count, 1, 0, grow_shape, &m, error));
     VSHI_TRY_DONE(lay_out_all(&m, error));
     VSHI_TRY_DONE(join_all(&m, error));

@@ -348,11 +348,7 @@ static vsh_result pack_pages(const vsh_unwrap_options *options, const vshi_shape
     } else {
         w.groups[w.group_count++] = (group){.count = item_count};
     }
-    w.job = vshi_job_begin(run, "pack", UNITS * w.group_count);
-    if (w.job == NULL) {
-        result = vshi_fail(error, VSH_ERROR_MEMORY, "%s: the system refused memory", "pages of an atlas");
-        goto done;
-    }
+    VSHI_TRY_DONE(vshi_job_open(&w.job, run, "pack", UNITS * w.group_count, "pages of an atlas", error));
     result = pack_groups(&w, error);
 done:
     vshi_job_end(w.job);

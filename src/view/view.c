@@ -71,11 +71,6 @@ static void describe(page *p, json_t *about, const char *key, json_t *value) {
 
 /* --- progress: a job for each file in the page */
 
-static vsh_result begin_job(const page *p, size_t total, vshi_job **job, vsh_error *error) {
-    *job = vshi_job_begin(p->run, "page", total);
-    return *job != NULL ? VSH_OK : vshi_fail_memory(error, p->path);
-}
-
 /* Advances a job, unless an earlier write failed. */
 static vsh_result advance(const page *p, vshi_job *job, size_t units, vsh_error *error) {
     const int reason = p->file.sink.error;
@@ -95,7 +90,7 @@ static ssize_t write_to_block(void *user, const char *bytes, size_t size) {
 static vsh_result add_triangles(page *p, const char *path, const vsh_model *model, json_t *about,
                                 vsh_error *error) {
     vshi_job *job;
-    VSHI_TRY(begin_job(p, vsh_model_mesh_count(model), &job, error));
+    VSHI_TRY(vshi_job_open(&job, p->run, "page", vsh_model_mesh_count(model), p->path, error));
     begin_block(p);
     FILE *to = fopencookie(p, "w", (cookie_io_functions_t){.write = write_to_block});
     vsh_result result = to != NULL ? vshi_lit_write_model(model, path, p->run, job, to, error)
@@ -197,7 +192,7 @@ static vsh_result add_gltf(page *p, const char *path, const vsh_model *model, js
         result = add_triangles(p, path, model, about, error);
         goto done;
     }
-    VSHI_TRY_DONE(begin_job(p, size, &work.gltf.job, error));
+    VSHI_TRY_DONE(vshi_job_open(&work.gltf.job, p->run, "page", size, p->path, error));
     VSHI_TRY_DONE(add_file(p, work.gltf.job, work.text, size, error));
     describe(p, about, "model", json_string(p->block));
     for (size_t k = 0; k < sizeof lists / sizeof lists[0]; ++k) {
@@ -276,7 +271,7 @@ static vsh_result add_channels(page *p, const source *from, json_t *channels, vs
     vshi_job *job = NULL;
     vsh_result result;
     VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, from->name, error));
-    VSHI_TRY_DONE(begin_job(p, (size_t)image->channel_count, &job, error));
+    VSHI_TRY_DONE(vshi_job_open(&job, p->run, "page", (size_t)image->channel_count, p->path, error));
     for (int32_t c = 0; c < image->channel_count; ++c) {
         const char *name = image->names[c];
         const bool picture = strlen(name) == 1 && strchr("RGB", name[0]) != NULL;

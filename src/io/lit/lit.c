@@ -338,10 +338,7 @@ vsh_result vsh_lit_write(const char *path, const vsh_model *model, const vsh_lit
     for (size_t i = 0; i < count; ++i) {
         VSHI_TRY_DONE(check_mesh(&work, i, error));
     }
-    work.gltf.job = vshi_job_begin(&full, "lit", count + 1);
-    if (work.gltf.job == NULL) {
-        VSHI_TRY_DONE(vshi_fail(error, VSH_ERROR_MEMORY, "a lit model: the system refused memory"));
-    }
+    VSHI_TRY_DONE(vshi_job_open(&work.gltf.job, &full, "lit", count + 1, "a lit model", error));
     VSHI_TRY_DONE(write_all(&work, error));
     vshi_job_advance(work.gltf.job, 1); /* all is written: too late to stop */
 done:
