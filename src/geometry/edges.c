@@ -343,19 +343,16 @@ static void key_of_corners(const void *user, size_t triangle, uint64_t key[VSHI_
 /* A triangle's layer is the number of triangles before it with the same corners. */
 static vsh_result find_layers(finding *f, vsh_error *error) {
     const size_t count = f->mesh->triangle_count;
-    uint32_t *original = NULL, *copies = NULL;
+    uint32_t *original, *copies;
     const vshi_array arrays[] = {VSHI_ARRAY(original, count), VSHI_ARRAY(copies, count)};
-    vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "copies of triangles", error));
-    VSHI_TRY_DONE(vshi_weld(count, key_of_corners, f->corners, original, error));
-    for (size_t i = 0; i < count; ++i) {
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "copies of triangles", error));
+    const vsh_result result = vshi_weld(count, key_of_corners, f->corners, original, error);
+    for (size_t i = 0; result == VSH_OK && i < count; ++i) {
         uint32_t *layer = &copies[original[i]];
         f->layer[i] = (uint8_t)*layer;
         *layer += *layer < MOST_LAYERS;
         f->layers = (int)*layer > f->layers ? (int)*layer : f->layers;
     }
-done:
-    free(copies);
     free(original);
     return result;
 }
@@ -415,18 +412,15 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart
                  .edges = edges,
                  .layers = 1};
     const vshi_array arrays[] = {VSHI_ARRAY(edges->weld, mesh->vertex_count),
-                                 VSHI_ARRAY(edges->skipped, count),
-                                 VSHI_ARRAY(edges->first, count),
-                                 VSHI_ARRAY(edges->doubled, count),
-                                 VSHI_ARRAY(edges->partner, 3 * count),
-                                 VSHI_ARRAY(f.flat, count),
-                                 VSHI_ARRAY(f.layer, count),
-                                 VSHI_ARRAY(f.corners, 3 * count),
-                                 VSHI_ARRAY(f.frayed, count),
-                                 VSHI_ARRAY(f.queue, count)};
+                                 VSHI_ARRAY(edges->skipped, count), VSHI_ARRAY(edges->first, count),
+                                 VSHI_ARRAY(edges->doubled, count), VSHI_ARRAY(edges->partner, 3 * count)};
+    const vshi_array own[] = {VSHI_ARRAY(f.flat, count), VSHI_ARRAY(f.layer, count),
+                              VSHI_ARRAY(f.corners, 3 * count), VSHI_ARRAY(f.frayed, count),
+                              VSHI_ARRAY(f.queue, count)};
     size_t flats = 0;
     vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
+    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(own, "edges of triangles", error));
     VSHI_TRY_DONE(weld_positions(mesh, edges->weld, error));
     VSHI_TRY_DONE(sort_sides(&f, error));
     if (copies_apart) {
@@ -447,12 +441,8 @@ vsh_result vshi_edges_find(const vsh_mesh *mesh, size_t index, bool copies_apart
 done:
     free(f.uses);
     free(f.spokes);
-    free(f.queue);
-    free(f.frayed);
     free(f.sides.sorted);
-    free(f.corners);
-    free(f.layer);
-    free(f.flat);
+    free(f.flat); /* the block's first array */
     return result;
 }
 
@@ -676,14 +666,14 @@ static void count_edges(const vshi_sorted_sides *sides, const uint8_t *shape, ed
 
 vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, vsh_error *error) {
     const size_t count = mesh->triangle_count;
-    uint32_t *weld = NULL, *corners = NULL;
-    uint8_t *shape = NULL; /* of each triangle */
+    uint32_t *weld, *corners;
+    uint8_t *shape; /* of each triangle */
     vshi_sorted_sides sides = {NULL, count, mesh->vertex_count, NULL};
     edge_count solid = {0, 0}, all = {0, 0};
-    const vshi_array arrays[] = {VSHI_ARRAY(weld, mesh->vertex_count), VSHI_ARRAY(corners, 3 * count),
-                                 VSHI_ARRAY(shape, count)};
+    const vshi_array arrays[] = {VSHI_ARRAY(corners, 3 * count), VSHI_ARRAY(shape, count),
+                                 VSHI_ARRAY(weld, mesh->vertex_count)};
     vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "edges of triangles", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "edges of triangles", error));
     VSHI_TRY_DONE(weld_positions(mesh, weld, error));
     for (size_t i = 0; i < count; ++i) {
         uint32_t *v = corners + 3 * i;
@@ -704,8 +694,6 @@ vsh_result vshi_mesh_count_edges(const vsh_mesh *mesh, vsh_mesh_report *report, 
     report->flipped_edges = with_flat ? all.flipped : solid.flipped;
 done:
     free(sides.sorted);
-    free(shape);
     free(corners);
-    free(weld);
     return result;
 }

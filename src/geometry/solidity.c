@@ -293,8 +293,7 @@ static vsh_result measure_whole(void *user, size_t whole, vsh_error *error) {
     const size_t vertices = found->rim_count > 0 ? k.mesh->vertex_count : 0;
     const vshi_array arrays[] = {VSHI_ARRAY(k.parent, vertices), VSHI_ARRAY(k.number, vertices),
                                  VSHI_ARRAY(k.holes, found->rim_count)};
-    vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "holes", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "holes", error));
     for (size_t i = 0, rim = 0; i < found->count; ++i) {
         vshi_component *c = &s->components[s->first[whole] + i];
         *c = (vshi_component){.whole = (uint32_t)whole,
@@ -311,11 +310,8 @@ static vsh_result measure_whole(void *user, size_t whole, vsh_error *error) {
         const measure m = measure_component(s, c);
         decide(s, c, &m);
     }
-done:
-    free(k.holes);
-    free(k.number);
     free(k.parent);
-    return result;
+    return VSH_OK;
 }
 
 /* --- rooms: components that look inwards and lie in solids */
@@ -564,7 +560,7 @@ static vsh_result make_wholes(const vsh_mesh *meshes, size_t mesh_count, vshi_wh
     *w = (vshi_wholes){0};
     const vshi_array arrays[] = {VSHI_ARRAY(w->meshes, mesh_count), VSHI_ARRAY(w->first, mesh_count + 1),
                                  VSHI_ARRAY(w->positions, mesh_count), VSHI_ARRAY(w->indices, mesh_count)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "objects", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "objects", error));
     for (size_t m = 0, next; m < mesh_count; m = next) {
         size_t vertices = meshes[m].vertex_count;
         for (next = m + 1; next < mesh_count && one_object(&meshes[m], &meshes[next]) &&
@@ -584,10 +580,7 @@ static void free_wholes(vshi_wholes *w) {
         free(w->positions[i]);
         free(w->indices[i]);
     }
-    free(w->indices);
-    free(w->positions);
-    free(w->first);
-    free(w->meshes);
+    free(w->meshes); /* the block's first array */
 }
 
 /* --- the whole analysis */
@@ -602,7 +595,7 @@ static vsh_result allocate(vshi_solidity *s, const vsh_mesh *meshes, vsh_error *
     const vshi_array arrays[] = {VSHI_ARRAY(s->found, wholes),         VSHI_ARRAY(s->first, wholes + 1),
                                  VSHI_ARRAY(s->first_cap, wholes + 1), VSHI_ARRAY(s->turned, triangles),
                                  VSHI_ARRAY(s->sides, triangles),      VSHI_ARRAY(s->holed, triangles)};
-    return VSHI_ALLOCATE_ALL(arrays, "solids", error);
+    return VSHI_ALLOCATE_BLOCK(arrays, "solids", error);
 }
 
 static void set_sides(vshi_solidity *s) {
@@ -689,13 +682,8 @@ void vshi_solidity_free(vshi_solidity *s) {
     free(s->cuts);
     free(s->caps);
     free(s->components);
-    free(s->holed);
-    free(s->sides);
-    free(s->turned);
     free(s->first_side);
-    free(s->first_cap);
-    free(s->first);
-    free(s->found);
+    free(s->found); /* the block's first array */
     free_wholes(&s->wholes);
     free(s);
 }
