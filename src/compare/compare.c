@@ -196,14 +196,12 @@ vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count, 
     }
     /* the caller's values and masks, then our masks */
     VSHI_TRY(vshi_check_limit(&full, values * (9.0 + 1.0), "comparison", error));
-    vshi_pair *pairs = NULL;
-    uint8_t *masks = NULL, *mask;
+    vshi_pair *pairs;
+    uint8_t *mask;
     tally t = {.worst = -1.0};
-    const vshi_array arrays[] = {VSHI_ARRAY(pairs, plane_count), VSHI_ARRAY(masks, (size_t)values),
+    const vshi_array arrays[] = {VSHI_ARRAY(pairs, plane_count), VSHI_ARRAY(mask, (size_t)values),
                                  VSHI_ARRAY(t.bins, (size_t)2 * BINS)};
-    vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "comparison", error));
-    mask = masks;
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "comparison", error));
     for (size_t i = 0; i < plane_count; ++i) {
         vsh_measures unused;
         make_pair(&planes[i], mask, &pairs[i], &unused);
@@ -212,11 +210,8 @@ vsh_result vsh_compare_accuracy(const vsh_compared *planes, size_t plane_count, 
     }
     *accuracy = (vsh_accuracy){.count = 0};
     measure_accuracy(pairs, plane_count, &t, accuracy);
-done:
-    free(t.bins);
-    free(masks);
     free(pairs);
-    return result;
+    return VSH_OK;
 }
 
 /* --- regions */

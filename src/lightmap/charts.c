@@ -331,13 +331,13 @@ static vsh_result make(vsh_charts *charts, const vsh_run *run, vshi_job *job, vs
     charts->info.bytes =
         sizeof *charts + charts->tight.bytes + sorted->bytes + triangles + tiles * sizeof *charts->samples;
     const vshi_array arrays[] = {
-        VSHI_ARRAY(charts->samples, tiles),
         {(void *)&overlaps->texels, mesh_count, sizeof *overlaps->texels},
         {(void *)&overlaps->others, mesh_count, sizeof *overlaps->others},
         {(void *)&overlaps->owners, mesh_count, sizeof *overlaps->owners},
         {(void *)&overlaps->triangles, triangles, sizeof *overlaps->triangles},
     };
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "texels", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE(charts->samples, tiles, "texels", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, "texels", error));
     VSHI_TRY_DONE(vshi_check_limit(
         run, (double)(charts->info.bytes + triangles) + vshi_tile_bytes(sorted, run->threads), "texels",
         error));
@@ -359,10 +359,7 @@ static vsh_result make(vsh_charts *charts, const vsh_run *run, vshi_job *job, vs
     }
 done:
     vshi_mesh_set_free(&set);
-    free(overlaps->triangles);
-    free(overlaps->owners);
-    free(overlaps->others);
-    free(overlaps->texels);
+    free(overlaps->texels); /* the block's first array */
     return result;
 }
 

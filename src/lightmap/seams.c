@@ -297,7 +297,7 @@ static vsh_result sort_islands(making *m, vsh_error *error) {
     const vshi_array arrays[] = {VSHI_ARRAY(s->first_unknown, s->island_count + 2),
                                  VSHI_ARRAY(s->first_row, s->island_count + 2),
                                  VSHI_ARRAY(s->rows, s->row_count)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "seams", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "seams", error));
     uint32_t *unknowns = s->first_unknown + 1,
              *rows = s->first_row + 1; /* moved on to their ends as they fill */
     for (size_t u = 0; u < s->unknown_count; ++u) {
@@ -763,9 +763,7 @@ done:
     free(s->vectors);
     free(s->channels); /* the block's first array */
     free_making(&m);
-    free(system->first_row);
-    free(system->first_unknown);
-    free(system->rows);
+    free(system->first_unknown); /* the block's first array */
     free(system->chart);
     free(system->page);
     free(system->texel);

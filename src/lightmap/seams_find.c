@@ -503,17 +503,15 @@ static vsh_result weld_and_compare(seam_search *s, vsh_error *error) {
     vshi_sorted_sides sides = {NULL, triangles, w.vertices, NULL};
     vsh_result result;
     VSHI_TRY_DONE(vshi_check_limit(s->run, bytes, what, error));
-    const vshi_array arrays[] = {VSHI_ARRAY(w.places, w.vertices), VSHI_ARRAY(w.weld, w.vertices),
-                                 VSHI_ARRAY(w.corners, 3 * triangles)};
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, what, error));
+    const vshi_array arrays[] = {VSHI_ARRAY(w.places, w.vertices), VSHI_ARRAY(w.corners, 3 * triangles),
+                                 VSHI_ARRAY(w.weld, w.vertices)};
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, what, error));
     VSHI_TRY_DONE(weld(s, &w, error));
     sides.corners = w.corners;
     VSHI_TRY_DONE(vshi_sort_sides(&sides, error));
     result = compare_edges(s, &sides, error);
 done:
     free(sides.sorted);
-    free(w.corners);
-    free(w.weld);
     free(w.places);
     return result;
 }

@@ -49,9 +49,7 @@ double vshi_lit_bytes(const vsh_render_options *options) {
 
 void vshi_lit_free(vshi_lit *lit) {
     if (lit != NULL) {
-        free(lit->triangles);
-        free(lit->planes);
-        free(lit->maps);
+        free(lit->maps); /* the block's first array */
         free(lit);
     }
 }
@@ -190,10 +188,10 @@ vsh_result vshi_lit_create(const vsh_render_options *options, const vsh_light *l
                        .triangle_count = count};
     const vshi_array arrays[] = {VSHI_ARRAY(made->maps, options->lit_count),
                                  VSHI_ARRAY(made->planes, shadows), VSHI_ARRAY(made->triangles, count)};
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "lit meshes", error));
+    VSHI_TRY_DONE(VSHI_ALLOCATE_BLOCK(arrays, "lit meshes", error));
     for (size_t i = 0; i < options->lit_count; ++i) {
         made->maps[i].of = &options->lit[i];
-        made->maps[i].shadow = made->planes != NULL ? made->planes + i * light_count : NULL;
+        made->maps[i].shadow = made->planes + i * light_count;
         if (options->lit[i].lightmap != NULL) {
             VSHI_TRY_DONE(find_planes(made, i, &made->maps[i], error));
         }

@@ -617,7 +617,7 @@ static vsh_result allocate_band(rendering *r, vsh_error *error) {
     const vshi_array arrays[] = {VSHI_ARRAY(r->seen, samples), VSHI_ARRAY(r->band.depth, lit),
                                  VSHI_ARRAY(r->band.triangle, lit),
                                  VSHI_ARRAY(r->stats, count_tiles(r->grid.columns) * (rows / TILE))};
-    return VSHI_ALLOCATE_ALL(arrays, "samples", error);
+    return VSHI_ALLOCATE_BLOCK(arrays, "samples", error);
 }
 
 static void raster_strips(void *user, size_t begin, size_t end) {
@@ -787,10 +787,7 @@ vsh_result vsh_render(const vsh_surface *surfaces, size_t surface_count, const v
     }
     result = render_picture(&r, stats != NULL ? stats : &own, error);
 done:
-    free(r.stats);
-    free(r.seen);
-    free(r.band.triangle);
-    free(r.band.depth);
+    free(r.seen); /* the block's first array */
     vshi_sampler_free(r.fog.sampler);
     vshi_lit_free(r.lit);
     vsh_query_free(r.query);

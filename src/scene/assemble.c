@@ -335,7 +335,7 @@ static vsh_result voxelise(const selection *of, const vsh_grid_options *options,
     VSHI_TRY(vshi_run_resolve(run, &held, error));
     VSHI_TRY(vshi_options_resolve(options, &a.options, sizeof a.options, "vsh_grid_options", error));
     held.memory_held += casters * BYTES_PER_CASTER;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "casters", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "casters", error));
     for (size_t i = 0; i < casters; ++i) {
         VSHI_TRY_DONE(is_selected(of, i) ? gather_caster(&a, i, error) : VSH_OK);
     }
@@ -348,12 +348,9 @@ done:
     while (a.made_count > 0) {
         vsh_grid_free(a.made[--a.made_count]);
     }
-    for (size_t i = 0; a.sdfs != NULL && i < casters; ++i) {
+    for (size_t i = 0; i < casters; ++i) {
         free(a.sdfs[i].nodes);
     }
-    free(a.made);
-    free(a.instances);
-    free(a.sdfs);
     free(a.meshes);
     return result;
 }
@@ -480,7 +477,7 @@ static vsh_result trace_casters(const selection *of, const vsh_run *run, vshi_tr
                                  VSHI_ARRAY(t.sdfs, sdfs), VSHI_ARRAY(t.places, sdfs),
                                  VSHI_ARRAY(t.balls, balls)};
     vsh_result result;
-    VSHI_TRY_DONE(VSHI_ALLOCATE_ALL(arrays, "casters", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "casters", error));
     for (size_t i = 0; i < casters; ++i) {
         VSHI_TRY_DONE(is_selected(of, i) ? add_traced(of, i, run, &t, error) : VSH_OK);
     }
@@ -500,10 +497,6 @@ done:
     while (t.surface_count > 0) {
         vshi_surface_mesh_free(&t.surfaces[--t.surface_count]);
     }
-    free(t.balls);
-    free(t.places);
-    free(t.sdfs);
-    free(t.surfaces);
     free(t.meshes);
     return result;
 }

@@ -230,7 +230,7 @@ vsh_result vshi_channels_name(const vsh_scene *scene, int32_t width, int32_t hei
                                  VSHI_ARRAY(channels->holds, count),
                                  VSHI_ARRAY(channels->values, channels->value_count),
                                  VSHI_ARRAY(channels->components, channels->value_count)};
-    VSHI_TRY(VSHI_ALLOCATE_ALL(arrays, "channels", error));
+    VSHI_TRY(VSHI_ALLOCATE_BLOCK(arrays, "channels", error));
     size_t at = 0, value = 0;
     for (size_t k = 0; k < kind_count; ++k) {
         for (size_t i = 0; i < count_values(&kinds[k], scene); ++i) {
@@ -288,11 +288,7 @@ void vshi_channels_free(vshi_channels *channels) {
     for (size_t i = 0; channels->store != NULL && i < channels->value_count; ++i) {
         vshi_store_give(channels->store, channels->values[i]);
     }
-    free(channels->components);
-    free(channels->values);
-    free(channels->holds);
-    free(channels->name_list);
-    free(channels->names);
+    free(channels->names); /* the block's first array */
     memset(channels, 0, sizeof *channels);
 }
 
