@@ -91,7 +91,7 @@ terminal() {
     grep -q '^vdbshade: bake [0-9]* %, about' 30 || fail "$(cat 30)"
     [[ $(terminal 100 info none.obj) == $'\033[31mvdbshade: '* && $(NO_COLOR=1 terminal 100 info none.obj) == vdbshade* &&
         $(TERM=dumb terminal 100 bake box.obj "${SMALL[@]}" -o out.exr) != *[%$'\033']* ]] || fail "colours"
-    [[ $(TERM=dumb VDBSHADE=timeout terminal 100 -s INT 2 "$VDBSHADE" bake box.obj --ao 1 --size 8192 --supersample 8 -o out.exr) =~ \
+    [[ $(TERM=dumb VDBSHADE=timeout terminal 100 -s INT $((2 * ${VSH_SLOWER:-1})) "$VDBSHADE" bake box.obj --ao 1 --size 8192 --supersample 8 -o out.exr) =~ \
         ^[^$'\033']*interrupted[^$'\033']*$ ]] || fail "an interrupt"
 }
 
