@@ -61,8 +61,7 @@ int32_t vshi_scene_resolution(const vsh_scene *scene, const vsh_assets *assets, 
 
 /* Makes all casters ready for a vshi_truth, whatever their layers: meshes and heightfields as triangles,
  * procedural shapes as solids. Each is NULL if there are none. Free them with vshi_triangles_free() and
- * vshi_solids_free(). Errors: VSH_ERROR_ARGUMENT (run); as vshi_triangles_create() and vshi_solids_create().
- */
+ * vshi_solids_free(). Errors: as vshi_triangles_create() and vshi_solids_create(). */
 vsh_result vshi_scene_truth(const vsh_scene *scene, const vsh_assets *assets, const vsh_run *run,
                             vshi_triangles **triangles, vshi_solids **solids, vsh_error *error);
 
