@@ -311,7 +311,10 @@ static int read_lightmaps(const render_settings *s, const cli_shading *shading, 
     for (size_t i = 0; i < count; ++i) {
         vsh_lit_meshes *lit = &shown->lit[i];
         render_lightmap *map = &shown->maps[i];
-        CLI_TRY(cli_check(vsh_image_read(s->lightmaps.text[i], &cli_run, &map->file, &cli_error)));
+        const char *path = s->lightmaps.text[i];
+        CLI_REFUSE_IF(!cli_has_ending(path, "exr"),
+                      "--lightmap '%s': expected an .exr; other formats do not name their channels", path);
+        CLI_TRY(cli_check(vsh_image_read(path, &cli_run, &map->file, &cli_error)));
         map->image = vsh_image_view(map->file);
         lit->meshes = vsh_assets_receiver(shading->assets, i, &lit->mesh_count);
         lit->lightmap = &map->image;

@@ -75,9 +75,7 @@ static vsh_result find_planes(const vshi_lit *lit, size_t index, lightmap *map, 
         map->shadow[l] = vshi_image_find_plane(image, name);
         if (map->shadow[l] == NULL) {
             return vshi_fail(error, VSH_ERROR_INPUT,
-                             "lightmap %zu: no channel %s, nor irradiance.R, .G and .B; bake an .exr, which "
-                             "names its channels",
-                             index, name);
+                             "lightmap %zu: no channel %s, nor irradiance.R, .G and .B", index, name);
         }
     }
     return lit->light_count > 0 || map->ao != NULL

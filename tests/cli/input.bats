@@ -184,7 +184,7 @@ by_each() {
     write_scene scene.json box.obj
     sed -i 's/out.exr/bake.xyz/' scene.json
     refuses 2 "scene.json: receivers[0]: output bake.xyz: ending 'xyz'" -- bake scene.json --size 8 --quiet
-    "$VDBSHADE" bake box.obj "${SMALL[@]}" --quiet --pack R=shadow.sun -o grey.png
-    shade render box.obj --sun 0.3,1,0.2 --size 8x8 --resolution 12 --lightmap grey.png --quiet -o out.png
-    refused 2 "grey.png: lightmap 0: no channel shadow.sun"
+    "$VDBSHADE" bake box.obj --ao 1 --size 8 --quiet -o ao.exr
+    shade render box.obj --sun 0.3,1,0.2 --size 8x8 --resolution 12 --lightmap ao.exr --quiet -o out.png
+    refused 2 "ao.exr: lightmap 0: no channel shadow.sun"
 }

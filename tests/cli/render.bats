@@ -58,7 +58,7 @@ LIST
     succeed bake box.obj --ao 0.5 --size 16 --resolution 24 -o ao.png --quiet
     refuse_each "${BOX[@]}" --lightmap <<'LIST'
 2 shadow.sun | ao.exr -o view.png --quiet
-2 'bake an .exr' | ao.png -o view.png --quiet
+2 'expected an .exr' | ao.png -o view.png --quiet
 3 gone.exr | gone.exr -o view.png --quiet
 2 receivers | ao.exr --lightmap ao.exr -o view.png --quiet
 2 'the output is also an input' | ao.exr -o ao.exr --quiet
