@@ -87,6 +87,8 @@ vsh_result vshi_gltf_load(vshi_gltf *gltf, size_t index, vsh_error *error) {
         VSHI_TRY(load_beside(gltf, index, json_string_value(uri), buffer, error));
     }
     if (buffer->bytes.size < length) {
+        free(buffer->owned); /* a warning may follow, and another texture ask for the buffer again */
+        buffer->owned = NULL;
         return vshi_fail(error, VSH_ERROR_READ, "%s: buffers[%zu] is cut short: %zu bytes of %zu", gltf->path,
                          index, buffer->bytes.size, length);
     }
