@@ -96,7 +96,11 @@ Outcome work(int32_t threads = 0) {
         vsh_bake_options bake = vsh_bake_options_default();
         bake.user = &o;
         bake.rows = add_rows;
-        o.check(vsh_bake_scene(scene, &bake, &run, nullptr, &error), error);
+        vsh_bake_error errors[3]{};
+        vsh_bake_report report{};
+        report.errors = errors;
+        o.check(vsh_bake_scene(scene, &bake, &run, &report, &error), error);
+        o.add(errors, 3);
         vsh_provenance_source source = vsh_provenance_source_default();
         source.scene = scene;
         source.voxel_size = 0.0625;
