@@ -26,7 +26,7 @@ constexpr float PLATEAU = 1.0f - 1e-4f; // share of the background: a smaller in
 constexpr float BEYOND = 1.0f + 1e-3f;  // share of the background: rounding to half floats adds less
 constexpr float CLIFF = 1.5f; // voxels from a voxel to the next at the band's rim; a distance changes by 1
 constexpr float JUMP = 2.5f;  // a larger change is damage; sheets thinner than a voxel change by up to 1.9
-constexpr int STRIDES[3] = {64, 8, 1}; // of a leaf's values
+constexpr int STRIDES[3] = {64, 8, 1}; // places between neighbours in a leaf
 constexpr double CLIFF_SHARE = 0.1;    // of the steps at the band's rim; conversions of meshes leave some
 
 Finding finding(Finding::Kind kind, const char *format, ...) __attribute__((format(printf, 2, 3)));

@@ -1,7 +1,7 @@
 /* The command line: words made from the input, run in a folder of small files. Options come from the
  * commands' own tables, so new ones are included. Values are likely ones or text from the input, without '/',
- * because nothing may be written outside of the folder. fork() fails, because the fuzzer has threads by then,
- * so commands that would parse a file in a child end there. The run is interrupted when its time is over, and
+ * because nothing may be written outside of the folder. fork() fails, because the fuzzer has threads by then.
+ * So commands that would parse a file in a child end there. The run is interrupted when its time is over, and
  * the machine seems to have 64 MiB. */
 #include "fuzz.h"
 

@@ -1,7 +1,9 @@
-/* Preloaded by tests/cli/refusals.bats: refuses system calls, or lists them. REFUSE_THREADS=N: no more than N
- * threads at a time, LINGER=MS: a thread counts for so long after it was joined; REFUSE_MEMFD: none;
- * VSH_TEST_MALLOC=N: the N-th allocation of the program VSH_TEST_PROGRAM; TELL_SYNCS=FILE: a line for each
- * fsync(), fdatasync() and rename(), with the names. */
+/* Preloaded by tests/cli/refusals.bats: refuses system calls, or lists them.
+ * - REFUSE_THREADS=N refuses more than N threads at a time. With LINGER=MS a thread counts for so long after
+ * it was joined.
+ * - REFUSE_MEMFD refuses every memfd_create().
+ * - VSH_TEST_MALLOC=N refuses the N-th allocation of the program VSH_TEST_PROGRAM.
+ * - TELL_SYNCS=FILE writes a line for each fsync(), fdatasync() and rename(), with the names. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>

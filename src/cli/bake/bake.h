@@ -64,8 +64,8 @@ typedef struct cli_bake_settings {
     double light_radius;
     const char *lights; /* a file, or CLI_LIGHTS_OF_INPUT; NULL: none */
     double floor[5];    /* W, D, X, Y, Z; W 0: none */
-    double height;      /* of a terrain; 0: not given, also in world[0] */
-    double world[2];    /* world[1] 0: the image's shape decides */
+    double height;      /* the terrain's height; 0: not given */
+    double world[2];    /* its sizes; [0] is 0: not given; [1] is 0: the image's shape decides */
     bool preview, per_object, dry_run;
     int32_t shard[2];         /* number and count of the part; 0: all of it */
     const char *const *words; /* [word_count]: the command line */
